@@ -1,0 +1,3 @@
+//! The `ondelette` command.
+
+fn main() {}

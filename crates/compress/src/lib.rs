@@ -1,0 +1,1 @@
+//! Hierarchical compression of integral operators.

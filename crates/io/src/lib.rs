@@ -1,0 +1,1 @@
+//! Scene, picture, model and solution files.

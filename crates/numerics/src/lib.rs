@@ -1,0 +1,8 @@
+//! Small exact numerics below every other crate.
+//!
+//! [`gauss`]: quadrature rules; [`par`]: the only parallelism of the project, the same bits for any thread count;
+//! [`seed`]: counter-based random numbers; [`krylov`]: stepping solvers for linear systems.
+
+pub mod gauss;
+pub mod par;
+pub mod seed;

@@ -1,0 +1,49 @@
+//! Ordered parallelism: the only user of rayon in the project.
+//!
+//! Work is split into chunks of a fixed size, outputs are disjoint and results come back in order, so that no result
+//! depends on the number of threads.
+
+use rayon::prelude::*;
+
+/// `f` of every index in `0..n`, in order.
+///
+/// ```
+/// assert_eq!(ondelette_numerics::par::map(4, |i| i * i), [0, 1, 4, 9]);
+/// ```
+pub fn map<T: Send>(n: usize, f: impl Fn(usize) -> T + Sync) -> Vec<T> {
+    (0..n).into_par_iter().map(f).collect()
+}
+
+/// Runs `f(chunk_index, chunk)` over consecutive chunks of `chunk` items; the last may be shorter.
+///
+/// # Panics
+/// If `chunk` is 0.
+pub fn for_each_chunk<T: Send>(data: &mut [T], chunk: usize, f: impl Fn(usize, &mut [T]) + Sync) {
+    data.par_chunks_mut(chunk).enumerate().for_each(|(i, c)| f(i, c));
+}
+
+/// Sum of `f(i)` for `i` in `0..n`: partial sums of 4096 terms, added in order.
+///
+/// ```
+/// assert_eq!(ondelette_numerics::par::sum(5, |i| i as f64), 10.0);
+/// ```
+pub fn sum(n: usize, f: impl Fn(usize) -> f64 + Sync) -> f64 {
+    const CHUNK: usize = 4096;
+    if n <= CHUNK {
+        return (0..n).map(f).fold(0.0, |a, b| a + b);
+    }
+    let partial: Vec<f64> = (0..n.div_ceil(CHUNK))
+        .into_par_iter()
+        .map(|c| (c * CHUNK..n.min((c + 1) * CHUNK)).map(&f).fold(0.0, |a, b| a + b))
+        .collect();
+    partial.into_iter().fold(0.0, |a, b| a + b)
+}
+
+/// Runs `f` with exactly `threads` worker threads (0: as many as the machine has).
+///
+/// # Errors
+/// The operating system refused the threads.
+pub fn with_threads<R: Send>(threads: usize, f: impl FnOnce() -> R + Send) -> Result<R, String> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|e| e.to_string())?;
+    Ok(pool.install(f))
+}

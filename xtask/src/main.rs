@@ -1,0 +1,3 @@
+//! The checks that CI and contributors run.
+
+fn main() {}
