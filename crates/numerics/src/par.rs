@@ -10,8 +10,8 @@ use rayon::prelude::*;
 /// ```
 /// assert_eq!(ondelette_numerics::par::map(4, |i| i * i), [0, 1, 4, 9]);
 /// ```
-pub fn map<T: Send>(n: usize, f: impl Fn(usize) -> T + Sync) -> Vec<T> {
-    (0..n).into_par_iter().map(|i| f(i)).collect()
+pub fn map<T: Send>(n: usize, f: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
+    (0..n).into_par_iter().map(f).collect()
 }
 
 /// Runs `f(chunk_index, chunk)` over consecutive chunks of `chunk` items; the last may be shorter.

@@ -1,1 +1,3 @@
 //! Wavelet bases.
+
+pub mod cell;
