@@ -4,5 +4,6 @@
 //! [`seed`]: counter-based random numbers; [`krylov`]: stepping solvers for linear systems.
 
 pub mod gauss;
+pub mod krylov;
 pub mod par;
 pub mod seed;

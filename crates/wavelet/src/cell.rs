@@ -115,6 +115,22 @@ impl std::fmt::Display for OrderError {
 
 impl std::error::Error for OrderError {}
 
+/// How samples become coefficients: `coefficient[i] = sum_q matrix[i][q] f(points[q])`.
+#[derive(Clone, Debug)]
+pub struct Analysis {
+    /// Local sample points.
+    pub points: Vec<[f64; 2]>,
+    /// Row-major, one row a function, one column a point.
+    pub matrix: Vec<f64>,
+}
+
+impl Analysis {
+    /// Coefficients of samples taken at the points.
+    pub fn coefficients(&self, samples: &[f64]) -> Vec<f64> {
+        self.matrix.chunks(self.points.len()).map(|row| row.iter().zip(samples).map(|(a, s)| a * s).sum()).collect()
+    }
+}
+
 /// The scaling functions of one cell shape and their two-scale matrices.
 ///
 /// ```
@@ -136,6 +152,8 @@ pub struct CellBasis {
     index: Vec<[u8; 2]>,
     /// One n x n matrix a child, row-major, `T_c[parent][child]`.
     two_scale: Vec<Vec<f64>>,
+    /// `analyses[n - 1]`: the rule of [`CellBasis::analysis`].
+    analyses: Vec<Analysis>,
     /// `truncated[p - 1]`: which functions make up the basis of order p.
     truncated: Vec<Vec<u16>>,
 }
@@ -143,6 +161,8 @@ pub struct CellBasis {
 impl CellBasis {
     /// Highest multiwavelet order.
     pub const MAX_MULTIWAVELET: usize = 6;
+    /// Most Gauss points an axis of [`CellBasis::analysis`].
+    pub const MAX_POINTS: usize = 10;
     /// Highest flatlet order.
     pub const MAX_FLATLET: usize = 4;
 
@@ -174,9 +194,11 @@ impl CellBasis {
             fell_back,
             index,
             two_scale: Vec::new(),
+            analyses: Vec::new(),
             truncated: Vec::new(),
         };
         basis.two_scale = (0..shape.arity()).map(|c| basis.two_scale_matrix(c)).collect();
+        basis.analyses = (1..=Self::MAX_POINTS).map(|n| basis.make_analysis(n)).collect();
         basis.truncated = (1..=order)
             .map(|p| {
                 let keep = |k: &[u8; 2]| match shape {
@@ -270,11 +292,16 @@ impl CellBasis {
         }
     }
 
-    /// Points and a matrix that turn samples into coefficients: `coefficient[i] = sum_q analysis[i][q] f(points[q])`.
+    /// Points and a matrix that turn samples into coefficients.
     ///
     /// Multiwavelets: projection by the rule with `n` >= M points an axis (n = M interpolates). Flatlets: box means by
-    /// `n` points an axis in every box.
-    pub fn analysis(&self, n: usize) -> (Vec<[f64; 2]>, Vec<f64>) {
+    /// `n` points an axis in every box. `n` is taken as at least 1 (M) and at most [`Self::MAX_POINTS`].
+    pub fn analysis(&self, n: usize) -> &Analysis {
+        let least = if self.family == CellFamily::Multiwavelet { self.order } else { 1 };
+        &self.analyses[n.clamp(least, Self::MAX_POINTS) - 1]
+    }
+
+    fn make_analysis(&self, n: usize) -> Analysis {
         let functions = self.len();
         match self.family {
             CellFamily::Multiwavelet => {
@@ -287,7 +314,7 @@ impl CellBasis {
                         analysis[i * points.len() + q] = w * values[i];
                     }
                 }
-                (points, analysis)
+                Analysis { points, matrix: analysis }
             }
             CellFamily::Flatlet => {
                 let (local, weights) = self.shape.rule(n);
@@ -300,7 +327,7 @@ impl CellBasis {
                         analysis[i * functions * per_box + i * per_box + q] = weights[q];
                     }
                 }
-                (points, analysis)
+                Analysis { points, matrix: analysis }
             }
         }
     }
@@ -543,10 +570,9 @@ mod tests {
             let b = CellBasis::new(CellShape::Square, CellFamily::Flatlet, order).unwrap();
             let f = |x: [f64; 2]| (0..order).map(|k| (x[0] - 0.3).powi(k as i32) * (1.0 + x[1]).powi(k as i32)).sum();
             let project = |map: &dyn Fn([f64; 2]) -> [f64; 2]| {
-                let (points, analysis) = b.analysis(4);
                 let f: &dyn Fn([f64; 2]) -> f64 = &f;
-                let samples: Vec<f64> = points.iter().map(|x| f(map(*x))).collect();
-                analysis.chunks(points.len()).map(|r| r.iter().zip(&samples).map(|(a, s)| a * s).sum()).collect()
+                let samples: Vec<f64> = b.analysis(4).points.iter().map(|x| f(map(*x))).collect();
+                b.analysis(4).coefficients(&samples)
             };
             let parent: Vec<f64> = project(&|x| x);
             for c in 0..4 {

@@ -1,0 +1,195 @@
+//! One block of the operator, and what test samples say of its error (thesis 4.5.3: fit on one set, test on another).
+
+use crate::cell::Cell;
+use crate::kernel::{Kernel, Pair};
+use ondelette_numerics::seed;
+use ondelette_wavelet::cell::CellBasis;
+
+/// The most children a cell has: one test sample a child.
+pub const CHILDREN: usize = 4;
+
+/// How exactly to couple a pair.
+#[derive(Clone, Copy, Debug)]
+pub struct CoupleSettings {
+    /// A change of the result (for a unit shooter) that does not matter: higher orders below it are dropped.
+    pub negligible: f64,
+    /// Most mask samples for one receiver point.
+    pub samples: usize,
+}
+
+/// One block with its error measures. Strengths are for a shooter of constant value 1.
+#[derive(Clone, Debug)]
+pub struct Coupling {
+    /// Row-major `[receiver function][shooter function]`, over the truncated bases.
+    pub block: Vec<f64>,
+    /// Orders of receiver and shooter (4.5.1: M1 inside M2 inside M3).
+    pub orders: [u8; 2],
+    /// Mean of the result over the receiver.
+    pub strength: f64,
+    /// Result minus what the block predicts, at one test point in each child of the receiver.
+    pub residual: [f64; CHILDREN],
+    /// How badly polynomials of this order fit K over the shooter, times strength: multiplies shooter detail.
+    pub roughness: f64,
+    /// Standard error of what the mask samples may have missed, times strength.
+    pub unseen: f64,
+    /// Whether mask samples were taken.
+    pub masked: bool,
+    /// Samples of the kernel taken.
+    pub kernel_samples: u32,
+    /// Samples of the mask taken at most.
+    pub mask_points: u32,
+}
+
+/// Couples a receiver with a shooter; `None` where the kernel is certainly zero.
+///
+/// Cost: about (n + 1)^2 + 4 moment evaluations for n receiver points an axis, and as many mask evaluations if masked.
+pub fn couple<K: Kernel>(
+    kernel: &K,
+    receiver: &Cell,
+    receiver_basis: &CellBasis,
+    shooter: &Cell,
+    shooter_basis: &CellBasis,
+    settings: CoupleSettings,
+) -> Option<Coupling> {
+    let pair = kernel.pair(receiver, shooter)?;
+    let (nr, ns) = (receiver_basis.len(), shooter_basis.len());
+    let analysis = receiver_basis.analysis(pair.receiver_points(receiver_basis.order()));
+    let points = &analysis.points;
+    let key = seed::combine(receiver.key, shooter.key.rotate_left(17));
+    let masked = pair.is_masked();
+
+    // samples of the result: masked moments at the fit points and at the test points
+    let tests = receiver.shape.test_points();
+    let mut moments = vec![0.0; (points.len() + tests.len()) * ns];
+    let mut mask_sum = 0.0;
+    let mut smooth_sum = 0.0;
+    let mut masked_sum = 0.0;
+    for (q, x) in points.iter().chain(&tests).enumerate() {
+        let row = &mut moments[q * ns..(q + 1) * ns];
+        pair.moments(*x, shooter_basis, row);
+        if masked {
+            let whole = total(shooter_basis, row);
+            if whole > 0.0 {
+                let mask = pair.mask(*x, settings.samples, seed::combine(key, q as u64));
+                mask_sum += mask * whole;
+                smooth_sum += whole;
+                masked_sum += 1.0;
+                row.iter_mut().for_each(|m| *m *= mask);
+            }
+        }
+    }
+
+    let mut block = vec![0.0; nr * ns];
+    for (i, weights) in analysis.matrix.chunks(points.len()).enumerate() {
+        for (q, w) in weights.iter().enumerate() {
+            if *w != 0.0 {
+                for j in 0..ns {
+                    block[i * ns + j] += w * moments[q * ns + j];
+                }
+            }
+        }
+    }
+
+    // the block's answer to a shooter of constant value 1
+    let constant: Vec<f64> = (0..nr).map(|i| total(shooter_basis, &block[i * ns..(i + 1) * ns])).collect();
+    let strength = receiver_basis.mean(&constant, 0.0, |a, b, k| a + b * k);
+    let mut residual = [0.0; CHILDREN];
+    let mut values = vec![0.0; nr];
+    for (t, x) in tests.iter().enumerate() {
+        receiver_basis.eval(*x, &mut values);
+        let predicted: f64 = values.iter().zip(&constant).map(|(v, c)| v * c).sum();
+        let q = points.len() + t;
+        residual[t] = total(shooter_basis, &moments[q * ns..(q + 1) * ns]) - predicted;
+    }
+
+    let unseen = if masked && smooth_sum > 0.0 {
+        // binomial error of a mask seen by N samples in all, with one pretended sample of the other kind
+        let n = masked_sum * settings.samples as f64;
+        let p = ((mask_sum / smooth_sum) * n + 0.5) / (n + 1.0);
+        (p * (1.0 - p) / n).sqrt() * smooth_sum / masked_sum
+    } else {
+        0.0
+    };
+    let roughness = roughness(&pair, receiver, shooter, shooter_basis) * strength;
+    let mut coupling = Coupling {
+        block,
+        orders: [receiver_basis.order() as u8, shooter_basis.order() as u8],
+        strength,
+        residual,
+        roughness,
+        unseen,
+        masked,
+        kernel_samples: ((points.len() + tests.len()) * ns) as u32,
+        mask_points: if masked { (points.len() + tests.len()) as u32 } else { 0 },
+    };
+    truncate(&mut coupling, receiver_basis, shooter_basis, settings.negligible);
+    Some(coupling)
+}
+
+/// What a shooter of constant value 1 contributes, from its moments.
+fn total(basis: &CellBasis, moments: &[f64]) -> f64 {
+    if basis.is_nested() { moments[0] } else { moments.iter().sum() }
+}
+
+/// Relative misfit over the shooter of the polynomial that interpolates K at Gauss points, at test points.
+fn roughness<P: Pair>(pair: &P, receiver: &Cell, shooter: &Cell, basis: &CellBasis) -> f64 {
+    let centre = match receiver.shape {
+        ondelette_wavelet::cell::CellShape::Triangle => [1.0 / 3.0, 1.0 / 3.0],
+        _ => [0.5, 0.5],
+    };
+    let fit = basis.analysis(basis.order());
+    let samples: Vec<f64> = fit.points.iter().map(|y| pair.sample(centre, *y)).collect();
+    let coefficients = fit.coefficients(&samples);
+    let mean = samples.iter().sum::<f64>() / samples.len() as f64;
+    if mean.abs() < f64::MIN_POSITIVE {
+        return 1.0;
+    }
+    let mut values = vec![0.0; basis.len()];
+    let tests = shooter.shape.test_points();
+    let misfit: f64 = tests
+        .iter()
+        .map(|y| {
+            basis.eval(*y, &mut values);
+            let predicted: f64 = values.iter().zip(&coefficients).map(|(v, c)| v * c).sum();
+            (pair.sample(centre, *y) - predicted).abs()
+        })
+        .sum::<f64>()
+        / tests.len() as f64;
+    (misfit / mean.abs()).min(10.0)
+}
+
+/// Drops the orders that do not matter at either end.
+fn truncate(c: &mut Coupling, receiver: &CellBasis, shooter: &CellBasis, negligible: f64) {
+    let (nr, ns) = (receiver.len(), shooter.len());
+    let size = |rows: &[u16], columns: &[u16], block: &[f64]| {
+        // sum of what is left when the kept part is removed
+        let kept = |list: &[u16], i: usize| list.contains(&(i as u16));
+        let mut dropped = 0.0;
+        for i in 0..nr {
+            for j in 0..ns {
+                if !(kept(rows, i) && kept(columns, j)) {
+                    dropped += block[i * ns + j].abs();
+                }
+            }
+        }
+        dropped
+    };
+    let orders = |basis: &CellBasis| if basis.is_nested() { 1..=basis.order() } else { basis.order()..=basis.order() };
+    let full_columns: Vec<u16> = (0..ns as u16).collect();
+    let p = orders(receiver)
+        .find(|&p| p == receiver.order() || size(receiver.truncated(p), &full_columns, &c.block) <= negligible)
+        .unwrap_or(receiver.order());
+    let rows = receiver.truncated(p);
+    let q = orders(shooter)
+        .find(|&q| q == shooter.order() || size(rows, shooter.truncated(q), &c.block) <= negligible)
+        .unwrap_or(shooter.order());
+    let columns = shooter.truncated(q);
+    if rows.len() < nr || columns.len() < ns {
+        c.block = rows
+            .iter()
+            .flat_map(|&i| columns.iter().map(move |&j| (i, j)))
+            .map(|(i, j)| c.block[i as usize * ns + j as usize])
+            .collect();
+        c.orders = [p as u8, q as u8];
+    }
+}

@@ -1,0 +1,153 @@
+//! The links: all blocks of the compressed operator, sorted by receiver, then shooter.
+
+use crate::couple::{CHILDREN, Coupling};
+use crate::forest::{Forest, NodeId};
+
+/// One link: the block between two nodes, and its error measures (see [`Coupling`]).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Link {
+    /// Node that receives.
+    pub receiver: NodeId,
+    /// Node that shoots.
+    pub shooter: NodeId,
+    /// Orders at receiver and shooter.
+    pub orders: [u8; 2],
+    /// Whether mask samples were taken.
+    pub masked: bool,
+    /// Where its block starts in [`Links::blocks`].
+    pub block: u64,
+    /// Result minus prediction in each child of the receiver.
+    pub residual: [f32; CHILDREN],
+    /// Mean result for a unit shooter.
+    pub strength: f32,
+    /// Factor of the shooter's detail.
+    pub roughness: f32,
+    /// Standard error of unseen mask.
+    pub unseen: f32,
+}
+
+/// All links.
+#[derive(Clone, Debug, Default)]
+pub struct Links {
+    links: Vec<Link>,
+    blocks: Vec<f64>,
+    starts: Vec<u32>,
+}
+
+impl Links {
+    /// No links.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Restores links that were stored; they must be sorted and their blocks in place.
+    ///
+    /// # Errors
+    /// A sentence when an index is out of range or the order is broken.
+    pub fn restore(forest: &Forest, links: Vec<Link>, blocks: Vec<f64>) -> Result<Self, String> {
+        let nodes = forest.len() as u32;
+        for (k, l) in links.iter().enumerate() {
+            if l.receiver.0 >= nodes || l.shooter.0 >= nodes {
+                return Err(format!("link {k} joins nodes {} and {} of {nodes}", l.receiver.0, l.shooter.0));
+            }
+            let bases = [forest.basis_of(l.receiver), forest.basis_of(l.shooter)];
+            for (basis, order) in bases.iter().zip(l.orders) {
+                let order = usize::from(order);
+                if order == 0 || order > basis.order() || (!basis.is_nested() && order != basis.order()) {
+                    return Err(format!("link {k} has order {order} in a basis of order {}", basis.order()));
+                }
+            }
+            let size =
+                bases[0].truncated(usize::from(l.orders[0])).len() * bases[1].truncated(usize::from(l.orders[1])).len();
+            if l.block.checked_add(size as u64).is_none_or(|end| end > blocks.len() as u64) {
+                return Err(format!("link {k} has its block beyond the stored {}", blocks.len()));
+            }
+            if k > 0 && (links[k - 1].receiver, links[k - 1].shooter) >= (l.receiver, l.shooter) {
+                return Err(format!("link {k} is out of order"));
+            }
+        }
+        let mut all = Links { links, blocks, starts: Vec::new() };
+        all.index(forest.len());
+        Ok(all)
+    }
+
+    /// The links, sorted by receiver, then shooter.
+    pub fn as_slice(&self) -> &[Link] {
+        &self.links
+    }
+
+    /// All blocks, one after the other.
+    pub fn blocks(&self) -> &[f64] {
+        &self.blocks
+    }
+
+    /// Number of links.
+    pub fn len(&self) -> usize {
+        self.links.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.links.is_empty()
+    }
+
+    /// The links of one receiver.
+    pub fn of(&self, receiver: NodeId) -> &[Link] {
+        match self.starts.get(receiver.index()..receiver.index() + 2) {
+            Some(range) => &self.links[range[0] as usize..range[1] as usize],
+            None => &[],
+        }
+    }
+
+    /// Removes the links whose index is marked, adds new ones, and sorts. Cost O(n log n).
+    ///
+    /// # Panics
+    /// If `removed` is shorter than the number of links.
+    pub fn replace(&mut self, forest: &Forest, removed: &[bool], added: Vec<(NodeId, NodeId, Coupling)>) {
+        let kept = self.links.iter().zip(removed).filter(|(_, gone)| !**gone).map(|(l, _)| (*l, None));
+        let mut all: Vec<(Link, Option<Vec<f64>>)> = kept.collect();
+        for (receiver, shooter, c) in added {
+            let link = Link {
+                receiver,
+                shooter,
+                orders: c.orders,
+                masked: c.masked,
+                block: 0,
+                residual: c.residual.map(|r| r as f32),
+                strength: c.strength as f32,
+                roughness: c.roughness as f32,
+                unseen: c.unseen as f32,
+            };
+            all.push((link, Some(c.block)));
+        }
+        all.sort_by_key(|(l, _)| (l.receiver, l.shooter));
+        let size = |l: &Link| {
+            let n = |id, order: u8| forest.basis_of(id).truncated(usize::from(order)).len();
+            n(l.receiver, l.orders[0]) * n(l.shooter, l.orders[1])
+        };
+        let mut links = Vec::with_capacity(all.len());
+        let mut blocks = Vec::with_capacity(self.blocks.len());
+        for (mut link, fresh) in all {
+            let start = blocks.len() as u64;
+            match fresh {
+                Some(block) => blocks.extend_from_slice(&block),
+                None => blocks.extend_from_slice(&self.blocks[link.block as usize..link.block as usize + size(&link)]),
+            }
+            link.block = start;
+            links.push(link);
+        }
+        self.links = links;
+        self.blocks = blocks;
+        self.index(forest.len());
+    }
+
+    fn index(&mut self, nodes: usize) {
+        self.starts = vec![0; nodes + 1];
+        for l in &self.links {
+            self.starts[l.receiver.index() + 1] += 1;
+        }
+        for n in 0..nodes {
+            self.starts[n + 1] += self.starts[n];
+        }
+    }
+}

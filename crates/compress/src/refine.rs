@@ -1,0 +1,142 @@
+//! ProjectKernel, second form (thesis 4.5.2): a link that is not good enough becomes links between children.
+//!
+//! The work of a batch is a list of independent tasks; the forest and the links change only when the batch is committed,
+//! so that a batch given up half-way leaves everything as it was.
+
+use crate::cell::Cell;
+use crate::couple::{CoupleSettings, Coupling, couple};
+use crate::forest::{Forest, NodeId};
+use crate::kernel::Kernel;
+use crate::links::Links;
+use ondelette_numerics::par;
+
+/// Which end of a link to split.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum End {
+    /// The receiver.
+    Receiver,
+    /// The shooter.
+    Shooter,
+}
+
+/// One pair to couple: a node or a child of a node (which may not exist yet) at each end.
+#[derive(Clone, Copy, Debug)]
+pub struct Task {
+    receiver: (NodeId, Option<u8>),
+    shooter: (NodeId, Option<u8>),
+    settings: CoupleSettings,
+}
+
+impl Task {
+    /// Couples two existing nodes.
+    pub fn between(receiver: NodeId, shooter: NodeId, settings: CoupleSettings) -> Self {
+        Task { receiver: (receiver, None), shooter: (shooter, None), settings }
+    }
+}
+
+/// A batch of work in progress.
+#[derive(Clone, Debug, Default)]
+pub struct Refinement {
+    tasks: Vec<Task>,
+    done: Vec<Option<Coupling>>,
+    removed: Vec<u32>,
+}
+
+impl Refinement {
+    /// A batch that couples the given pairs.
+    pub fn linking(tasks: Vec<Task>) -> Self {
+        Refinement { tasks, done: Vec::new(), removed: Vec::new() }
+    }
+
+    /// A batch that splits the chosen links (by index) at the chosen ends.
+    pub fn splitting(
+        forest: &Forest,
+        links: &Links,
+        chosen: &[(u32, End)],
+        settings: impl Fn(u32) -> CoupleSettings,
+    ) -> Self {
+        let mut tasks = Vec::with_capacity(4 * chosen.len());
+        for &(k, end) in chosen {
+            let link = links.as_slice()[k as usize];
+            let settings = settings(k);
+            let split = match end {
+                End::Receiver => link.receiver,
+                End::Shooter => link.shooter,
+            };
+            for c in 0..forest.node(split).cell.shape.arity() as u8 {
+                tasks.push(match end {
+                    End::Receiver => Task { receiver: (split, Some(c)), shooter: (link.shooter, None), settings },
+                    End::Shooter => Task { receiver: (link.receiver, None), shooter: (split, Some(c)), settings },
+                });
+            }
+        }
+        Refinement { tasks, done: Vec::new(), removed: chosen.iter().map(|c| c.0).collect() }
+    }
+
+    /// Number of tasks.
+    pub fn len(&self) -> usize {
+        self.tasks.len()
+    }
+
+    /// Whether there is nothing to do.
+    pub fn is_empty(&self) -> bool {
+        self.tasks.is_empty()
+    }
+
+    /// Number of tasks done.
+    pub fn done(&self) -> usize {
+        self.done.len()
+    }
+
+    /// Does the next `most` tasks, in parallel; true when all are done. Returns also (kernel samples, mask points) taken.
+    pub fn step<K: Kernel>(&mut self, kernel: &K, forest: &Forest, most: usize) -> (bool, u64, u64) {
+        let from = self.done.len();
+        let count = most.min(self.tasks.len() - from);
+        let cell = |(id, child): (NodeId, Option<u8>)| -> Cell {
+            let cell = forest.node(id).cell;
+            child.map_or(cell, |c| cell.child(usize::from(c)))
+        };
+        let tasks = &self.tasks;
+        let fresh = par::map(count, |i| {
+            let task = tasks[from + i];
+            let (r, s) = (cell(task.receiver), cell(task.shooter));
+            couple(kernel, &r, forest.basis(r.shape), &s, forest.basis(s.shape), task.settings)
+        });
+        let samples = fresh.iter().flatten().map(|c| u64::from(c.kernel_samples)).sum();
+        let masks = fresh.iter().flatten().map(|c| u64::from(c.mask_points)).sum();
+        self.done.extend(fresh);
+        (self.done.len() == self.tasks.len(), samples, masks)
+    }
+
+    /// Applies the batch: splits nodes, removes the old links, adds the new ones. Returns the nodes that were split, in
+    /// order, so that the caller can push its values to their children.
+    ///
+    /// # Panics
+    /// If tasks are left to do.
+    pub fn commit(self, forest: &mut Forest, links: &mut Links) -> Vec<NodeId> {
+        assert_eq!(self.done.len(), self.tasks.len(), "all tasks are done before a batch is committed");
+        let mut split = Vec::new();
+        let mut resolve = |forest: &mut Forest, (id, child): (NodeId, Option<u8>)| match child {
+            None => id,
+            Some(c) => {
+                if forest.is_leaf(id) {
+                    forest.split(id);
+                    split.push(id);
+                }
+                forest.child(id, usize::from(c))
+            }
+        };
+        let mut added = Vec::with_capacity(self.done.len());
+        for (task, coupling) in self.tasks.iter().zip(self.done) {
+            let receiver = resolve(forest, task.receiver);
+            let shooter = resolve(forest, task.shooter);
+            if let Some(coupling) = coupling {
+                added.push((receiver, shooter, coupling));
+            }
+        }
+        let mut removed = vec![false; links.len()];
+        self.removed.iter().for_each(|&k| removed[k as usize] = true);
+        links.replace(forest, &removed, added);
+        split
+    }
+}

@@ -1,0 +1,103 @@
+//! Pull, gather, push (thesis 4.4.2): applying the compressed operator in time linear in nodes and links.
+//!
+//! Values are `[f64; C]` (C channels that share the operator), in the layout of [`Forest`]: `stride` slots a node.
+
+use crate::forest::{Forest, NodeId};
+use crate::links::Links;
+use ondelette_numerics::par;
+
+fn add<const C: usize>(to: &mut [f64; C], k: f64, from: [f64; C]) {
+    for c in 0..C {
+        to[c] += k * from[c];
+    }
+}
+
+/// Fills the inner nodes from the leaves: every node gets the projection of the function below it.
+///
+/// # Panics
+/// If `values` has not `forest.len() * forest.stride()` entries.
+pub fn pull<const C: usize>(forest: &Forest, values: &mut [[f64; C]]) {
+    let stride = forest.stride();
+    assert_eq!(values.len(), forest.len() * stride);
+    for n in (0..forest.len()).rev() {
+        let id = NodeId(n as u32);
+        if forest.is_leaf(id) {
+            continue;
+        }
+        let basis = forest.basis_of(id);
+        let len = basis.len();
+        let (head, tail) = values.split_at_mut((n + 1) * stride);
+        let parent = &mut head[n * stride..n * stride + len];
+        parent.fill([0.0; C]);
+        for c in 0..basis.shape().arity() {
+            let at = forest.child(id, c).index() * stride - (n + 1) * stride;
+            basis.pull(c, &tail[at..at + len], parent, add);
+        }
+    }
+}
+
+/// Adds the functions of all inner nodes to the leaves below them; inner nodes are left as they are.
+pub fn push<const C: usize>(forest: &Forest, values: &mut [[f64; C]]) {
+    let stride = forest.stride();
+    assert_eq!(values.len(), forest.len() * stride);
+    for n in 0..forest.len() {
+        push_node(forest, NodeId(n as u32), values);
+    }
+}
+
+/// Adds one inner node's function to its children.
+pub fn push_node<const C: usize>(forest: &Forest, id: NodeId, values: &mut [[f64; C]]) {
+    if forest.is_leaf(id) {
+        return;
+    }
+    let (n, stride) = (id.index(), forest.stride());
+    let basis = forest.basis_of(id);
+    let len = basis.len();
+    let (head, tail) = values.split_at_mut((n + 1) * stride);
+    let parent = &head[n * stride..n * stride + len];
+    for c in 0..basis.shape().arity() {
+        let at = forest.child(id, c).index() * stride - (n + 1) * stride;
+        basis.push(c, parent, &mut tail[at..at + len], add);
+    }
+}
+
+/// `result` = all links applied to `values`: every node gets what its own links bring. Parallel over receivers.
+pub fn gather<const C: usize>(forest: &Forest, links: &Links, values: &[[f64; C]], result: &mut [[f64; C]]) {
+    let stride = forest.stride();
+    assert_eq!(values.len(), forest.len() * stride);
+    assert_eq!(result.len(), values.len());
+    const NODES: usize = 64;
+    par::for_each_chunk(result, NODES * stride, |chunk, slots| {
+        for (k, node) in slots.chunks_mut(stride).enumerate() {
+            node.fill([0.0; C]);
+            let id = NodeId((chunk * NODES + k) as u32);
+            for link in links.of(id) {
+                let rows = forest.basis_of(id).truncated(usize::from(link.orders[0]));
+                let columns = forest.basis_of(link.shooter).truncated(usize::from(link.orders[1]));
+                let from = link.shooter.index() * stride;
+                let block = &links.blocks()[link.block as usize..][..rows.len() * columns.len()];
+                for (&i, row) in rows.iter().zip(block.chunks(columns.len())) {
+                    let mut sum = [0.0; C];
+                    for (&j, k) in columns.iter().zip(row) {
+                        add(&mut sum, *k, values[from + j as usize]);
+                    }
+                    add(&mut node[i as usize], 1.0, sum);
+                }
+            }
+        }
+    });
+}
+
+/// The whole operator: pull, gather, push. Inner nodes of `values` are overwritten by their pulls; the answer is at the
+/// leaves of `result`, with inner nodes set to zero.
+pub fn apply<const C: usize>(forest: &Forest, links: &Links, values: &mut [[f64; C]], result: &mut [[f64; C]]) {
+    pull(forest, values);
+    gather(forest, links, values, result);
+    push(forest, result);
+    let stride = forest.stride();
+    for (n, node) in forest.nodes().iter().enumerate() {
+        if node.first_child != 0 {
+            result[n * stride..(n + 1) * stride].fill([0.0; C]);
+        }
+    }
+}
