@@ -1,7 +1,16 @@
 //! Diffuse interreflection of light by wavelet radiosity (thesis chapters 3 and 4).
 
+pub mod form_factor;
+pub mod kernel;
+pub mod occluder;
 mod rgb;
 pub mod scene;
+pub mod settings;
+pub mod solution;
+pub mod solver;
 
 pub use rgb::Rgb;
 pub use scene::Scene;
+pub use settings::{Basis, Settings};
+pub use solution::{Solution, Statistics};
+pub use solver::{Event, SolveError, Solver};

@@ -10,6 +10,7 @@
 //! * a two-sided material makes two [`Side`]s of one patch: two receivers and two emitters that share one geometry.
 
 mod draft;
+pub mod samples;
 
 pub use draft::{BuildOptions, DraftFace, SceneDraft, SceneError};
 
@@ -72,6 +73,13 @@ pub struct Material {
     pub radiance: Rgb,
     /// Whether the back reflects and emits like the front.
     pub two_sided: bool,
+}
+
+impl Material {
+    /// Whether it only emits: such sides receive too, but the promised error does not count them.
+    pub fn is_pure_emitter(&self) -> bool {
+        self.reflectance.max() == 0.0 && self.radiance.max() > 0.0
+    }
 }
 
 /// A mesh instance of the file: an OBJ object, or one primitive under one glTF node.

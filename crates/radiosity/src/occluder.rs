@@ -1,0 +1,257 @@
+//! What blocks light: rays and shafts against all patches, through a bounding volume hierarchy (crate obvhs).
+//!
+//! The hierarchy only finds candidates, in f32 boxes grown by a margin; every hit is decided in f64 on the exact patch.
+//! A patch blocks from both sides. Self-hits are excluded by patch index, not by moving the ray.
+
+use crate::scene::{Patch, Scene, Shape};
+use glam::{DVec3, Vec3A};
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::Bvh2;
+use obvhs::cwbvh::CwBvh;
+use obvhs::ray::{Ray, RayHit};
+use obvhs::{Boundable, BvhBuildParams};
+
+/// A patch ready for intersection.
+#[derive(Clone, Copy, Debug)]
+struct Facet {
+    normal: DVec3,
+    origin: DVec3,
+    /// Rows that turn a point of the plane into (s, t).
+    to_s: DVec3,
+    to_t: DVec3,
+    triangle: bool,
+}
+
+/// Edges count as part of a patch: neighbours leave no gap between them.
+const EDGE: f64 = 1e-9;
+
+impl Facet {
+    fn of(patch: &Patch) -> Self {
+        let normal = patch.u.cross(patch.v);
+        let inverse = 1.0 / normal.length_squared();
+        Facet {
+            normal: normal.normalize(),
+            origin: patch.origin,
+            to_s: patch.v.cross(normal) * inverse,
+            to_t: normal.cross(patch.u) * inverse,
+            triangle: patch.shape == Shape::Triangle,
+        }
+    }
+
+    /// Parameter along the segment a + t (b - a) of the crossing with the patch.
+    fn crossing(&self, a: DVec3, d: DVec3) -> Option<f64> {
+        let slope = self.normal.dot(d);
+        if slope == 0.0 {
+            return None;
+        }
+        let t = self.normal.dot(self.origin - a) / slope;
+        let p = a + d * t - self.origin;
+        let (u, v) = (self.to_s.dot(p), self.to_t.dot(p));
+        let inside =
+            u >= -EDGE && v >= -EDGE && if self.triangle { u + v <= 1.0 + EDGE } else { u.max(v) <= 1.0 + EDGE };
+        inside.then_some(t)
+    }
+}
+
+struct Bounded(Aabb);
+
+impl Boundable for Bounded {
+    fn aabb(&self) -> Aabb {
+        self.0
+    }
+}
+
+/// Where a ray meets a patch first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Index into [`Scene::patches`].
+    pub patch: u32,
+    /// Distance in units of the direction's length.
+    pub t: f64,
+    /// Patch parameters (s, t) of the point.
+    pub at: [f64; 2],
+    /// Whether the ray arrived at the front.
+    pub front: bool,
+}
+
+/// All patches of a scene, for rays and shafts.
+pub struct Occluders {
+    facets: Vec<Facet>,
+    corners: Vec<Vec<DVec3>>,
+    wide: CwBvh,
+    binary: Bvh2,
+    scale: f64,
+}
+
+/// Segments end this share of their length before they reach what they aim at.
+const RELATIVE_EPSILON: f64 = 1e-6;
+
+impl Occluders {
+    /// Builds the hierarchy. Cost O(n log n).
+    pub fn new(scene: &Scene) -> Self {
+        let scale = scene.diagonal();
+        let largest = scene.bounds.iter().map(|b| b.abs().max_element()).fold(0.0, f64::max);
+        let margin = (1e-6 * scale + 2e-7 * largest) as f32;
+        let corners: Vec<Vec<DVec3>> = scene.patches.iter().map(Patch::corners).collect();
+        let boxes: Vec<Bounded> = corners
+            .iter()
+            .map(|c| {
+                let low = c.iter().fold(DVec3::INFINITY, |a, b| a.min(*b));
+                let high = c.iter().fold(DVec3::NEG_INFINITY, |a, b| a.max(*b));
+                let narrow = |v: DVec3| Vec3A::new(v.x as f32, v.y as f32, v.z as f32);
+                Bounded(Aabb::new(narrow(low) - margin, narrow(high) + margin))
+            })
+            .collect();
+        let mut spent = std::time::Duration::ZERO;
+        let params = BvhBuildParams { pre_split: false, ..BvhBuildParams::very_slow_build() };
+        Occluders {
+            facets: scene.patches.iter().map(Facet::of).collect(),
+            corners,
+            wide: obvhs::cwbvh::builder::build_cwbvh(&boxes, params, &mut spent),
+            binary: obvhs::bvh2::builder::build_bvh2(&boxes, params, &mut spent),
+            scale,
+        }
+    }
+
+    /// Length below which two points count as one: 1e-7 of the scene's diagonal.
+    pub fn tolerance(&self) -> f64 {
+        1e-7 * self.scale
+    }
+
+    /// Whether anything but the two given patches lies between two points.
+    pub fn blocked(&self, from: DVec3, to: DVec3, except: [u32; 2]) -> bool {
+        let d = to - from;
+        let narrow = |v: DVec3| Vec3A::new(v.x as f32, v.y as f32, v.z as f32);
+        let ray = Ray::new(narrow(from), narrow(d), 0.0, 1.0);
+        !self.wide.ray_traverse_miss(ray, |_, id| {
+            let patch = self.wide.primitive_indices[id];
+            if patch == except[0] || patch == except[1] {
+                return f32::INFINITY;
+            }
+            match self.facets[patch as usize].crossing(from, d) {
+                Some(t) if t > RELATIVE_EPSILON && t < 1.0 - RELATIVE_EPSILON => 0.5,
+                _ => f32::INFINITY,
+            }
+        })
+    }
+
+    /// The first patch along a ray, leaving out one patch (where the ray starts).
+    pub fn first_hit(&self, from: DVec3, direction: DVec3, except: Option<u32>) -> Option<Hit> {
+        let narrow = |v: DVec3| Vec3A::new(v.x as f32, v.y as f32, v.z as f32);
+        let ray = Ray::new(narrow(from), narrow(direction), 0.0, f32::INFINITY);
+        let least = RELATIVE_EPSILON * self.scale / direction.length();
+        let mut nearest: Option<(f64, u32)> = None;
+        let mut hit = RayHit::none();
+        self.wide.ray_traverse(ray, &mut hit, |_, id| {
+            let patch = self.wide.primitive_indices[id];
+            if Some(patch) == except {
+                return f32::INFINITY;
+            }
+            match self.facets[patch as usize].crossing(from, direction) {
+                Some(t) if t > least => {
+                    // ties go to the lower index, whatever the order of traversal
+                    if nearest.is_none_or(|(best, at)| t < best || (t == best && patch < at)) {
+                        nearest = Some((t, patch));
+                    }
+                    // a little farther than it is, so that rounding to f32 hides nothing in front of it
+                    (t * (1.0 + 1e-6)) as f32
+                }
+                _ => f32::INFINITY,
+            }
+        });
+        let (t, patch) = nearest?;
+        let facet = &self.facets[patch as usize];
+        let p = from + direction * t - facet.origin;
+        let at = [facet.to_s.dot(p).clamp(0.0, 1.0), facet.to_t.dot(p).clamp(0.0, 1.0)];
+        Some(Hit { patch, t, at, front: facet.normal.dot(direction) < 0.0 })
+    }
+
+    /// All patches that may reach into the shaft, without the two given ones.
+    pub fn candidates(&self, shaft: &Shaft, except: [u32; 2]) -> Vec<u32> {
+        let mut found = Vec::new();
+        if self.binary.nodes.is_empty() {
+            return found;
+        }
+        let mut stack = vec![0u32];
+        while let Some(n) = stack.pop() {
+            let node = &self.binary.nodes[n as usize];
+            let wide = |v: Vec3A| DVec3::new(f64::from(v.x), f64::from(v.y), f64::from(v.z));
+            if shaft.misses_box(wide(node.aabb.min), wide(node.aabb.max)) {
+                continue;
+            }
+            if node.prim_count == 0 {
+                stack.push(node.first_index);
+                stack.push(node.first_index + 1);
+                continue;
+            }
+            for k in node.first_index..node.first_index + node.prim_count {
+                let patch = self.binary.primitive_indices[k as usize];
+                if patch != except[0] && patch != except[1] && !shaft.misses_polygon(&self.corners[patch as usize]) {
+                    found.push(patch);
+                }
+            }
+        }
+        found
+    }
+
+    /// Whether one patch alone hides one convex polygon from another: it crosses every segment between their corners.
+    pub fn hides(&self, patch: u32, from: &[DVec3], to: &[DVec3]) -> bool {
+        let facet = &self.facets[patch as usize];
+        from.iter().all(|&a| {
+            to.iter()
+                .all(|&b| facet.crossing(a, b - a).is_some_and(|t| t > RELATIVE_EPSILON && t < 1.0 - RELATIVE_EPSILON))
+        })
+    }
+}
+
+/// The convex hull of two convex polygons, as half-spaces (Haines and Wallace 1991, with exact planes).
+pub struct Shaft {
+    planes: Vec<(DVec3, f64)>,
+    tolerance: f64,
+}
+
+impl Shaft {
+    /// The shaft between two polygons, each seen from its front; space behind either plane is left out.
+    pub fn between(a: &[DVec3], a_normal: DVec3, b: &[DVec3], b_normal: DVec3, tolerance: f64) -> Self {
+        let mut planes = Vec::with_capacity(16);
+        // a point p is outside where n . p > d
+        planes.push((-a_normal, -a_normal.dot(a[0])));
+        planes.push((-b_normal, -b_normal.dot(b[0])));
+        for (edges, apexes) in [(a, b), (b, a)] {
+            for i in 0..edges.len() {
+                let (p, q) = (edges[i], edges[(i + 1) % edges.len()]);
+                for &apex in apexes {
+                    let n = (q - p).cross(apex - p);
+                    let length = n.length();
+                    if length <= 1e-12 * (q - p).length() * (apex - p).length() {
+                        continue;
+                    }
+                    let n = n / length;
+                    let d = n.dot(p);
+                    let heights = || a.iter().chain(b).map(|c| n.dot(*c) - d);
+                    if heights().all(|h| h <= tolerance) {
+                        planes.push((n, d));
+                    } else if heights().all(|h| h >= -tolerance) {
+                        planes.push((-n, -d));
+                    }
+                }
+            }
+        }
+        Shaft { planes, tolerance }
+    }
+
+    fn misses_box(&self, low: DVec3, high: DVec3) -> bool {
+        self.planes.iter().any(|(n, d)| {
+            let nearest = DVec3::new(
+                if n.x > 0.0 { low.x } else { high.x },
+                if n.y > 0.0 { low.y } else { high.y },
+                if n.z > 0.0 { low.z } else { high.z },
+            );
+            n.dot(nearest) >= *d - self.tolerance
+        })
+    }
+
+    fn misses_polygon(&self, corners: &[DVec3]) -> bool {
+        self.planes.iter().any(|(n, d)| corners.iter().all(|c| n.dot(*c) >= *d - self.tolerance))
+    }
+}

@@ -1,0 +1,140 @@
+//! What was solved: the irradiance of every side, readable anywhere.
+
+use crate::rgb::Rgb;
+use crate::scene::Scene;
+use crate::settings::Settings;
+use glam::DVec3;
+use ondelette_compress::{Forest, Links};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// Counts of a solution: deterministic, no clock.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Statistics {
+    /// Whether the promise is kept.
+    pub finished: bool,
+    /// Sweeps over all links.
+    pub iterations: u64,
+    /// Relative residual of the last solve.
+    pub residual: f64,
+    /// Estimated error, relative to the mean irradiance.
+    pub estimated_error: f64,
+    /// Kernel samples taken.
+    pub kernel_samples: u64,
+    /// Visibility rays cast.
+    pub rays: u64,
+}
+
+/// A solved (or half-solved) scene.
+#[derive(Clone, Debug)]
+pub struct Solution {
+    scene: Arc<Scene>,
+    settings: Settings,
+    forest: Forest,
+    links: Links,
+    irradiance: Vec<[f64; 3]>,
+    statistics: Statistics,
+}
+
+impl Solution {
+    /// Puts the parts together; `irradiance` holds `forest.stride()` coefficients a node, at the leaves.
+    ///
+    /// # Panics
+    /// If the lengths do not fit.
+    pub fn new(
+        scene: Arc<Scene>,
+        settings: Settings,
+        forest: Forest,
+        links: Links,
+        irradiance: Vec<[f64; 3]>,
+        statistics: Statistics,
+    ) -> Self {
+        assert_eq!(irradiance.len(), forest.len() * forest.stride());
+        assert_eq!(forest.roots().len(), scene.sides.len());
+        Solution { scene, settings, forest, links, irradiance, statistics }
+    }
+
+    /// The scene.
+    pub fn scene(&self) -> &Arc<Scene> {
+        &self.scene
+    }
+
+    /// The settings.
+    pub fn settings(&self) -> Settings {
+        self.settings
+    }
+
+    /// The elements.
+    pub fn forest(&self) -> &Forest {
+        &self.forest
+    }
+
+    /// The links.
+    pub fn links(&self) -> &Links {
+        &self.links
+    }
+
+    /// Irradiance coefficients, `forest().stride()` a node, zero at inner nodes.
+    pub fn coefficients(&self) -> &[[f64; 3]] {
+        &self.irradiance
+    }
+
+    /// Counts.
+    pub fn statistics(&self) -> &Statistics {
+        &self.statistics
+    }
+
+    /// Whether the promise is kept.
+    pub fn is_finished(&self) -> bool {
+        self.statistics.finished
+    }
+
+    /// Irradiance at side-local coordinates, in the scene's irradiance unit. Not clamped.
+    pub fn irradiance(&self, side: usize, at: [f64; 2]) -> Rgb {
+        let (leaf, x) = self.forest.locate(side, at);
+        let basis = self.forest.basis_of(leaf);
+        let mut values = [0.0; 36];
+        basis.eval(x, &mut values);
+        let stride = self.forest.stride();
+        let own = &self.irradiance[leaf.index() * stride..leaf.index() * stride + basis.len()];
+        own.iter().zip(&values).fold(Rgb::BLACK, |sum, (c, v)| sum + Rgb(*c) * *v)
+    }
+
+    /// Radiosity (exitance plus reflected) at side-local coordinates.
+    pub fn radiosity(&self, side: usize, at: [f64; 2]) -> Rgb {
+        let material = self.scene.material(self.scene.sides[side]);
+        material.radiance * std::f64::consts::PI + material.reflectance * self.irradiance(side, at)
+    }
+
+    /// Mean irradiance of a side.
+    pub fn mean_irradiance(&self, side: usize) -> Rgb {
+        let root = self.forest.roots()[side];
+        let whole = self.forest.node(root).measure;
+        let mut sum = Rgb::BLACK;
+        self.each_leaf(|leaf, root, measure, mean| {
+            let _ = leaf;
+            if root == side {
+                sum += mean * (measure / whole);
+            }
+        });
+        sum
+    }
+
+    /// Calls `f(leaf index, side, area, mean irradiance)` for every leaf in node order.
+    pub fn each_leaf(&self, mut f: impl FnMut(usize, usize, f64, Rgb)) {
+        let stride = self.forest.stride();
+        for (n, node) in self.forest.nodes().iter().enumerate() {
+            if node.first_child == 0 {
+                let own = &self.irradiance[n * stride..(n + 1) * stride];
+                let mean = self.forest.basis(node.cell.shape).mean(own, [0.0; 3], |a, b, k| (Rgb(a) + Rgb(b) * k).0);
+                f(n, node.cell.root as usize, node.measure, Rgb(mean));
+            }
+        }
+    }
+
+    /// The point in space at side-local coordinates.
+    pub fn point(&self, side: usize, at: [f64; 2]) -> DVec3 {
+        let (o, u, v) = self.scene.frame(self.scene.sides[side]);
+        o + u * at[0] + v * at[1]
+    }
+}
