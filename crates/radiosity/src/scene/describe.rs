@@ -108,7 +108,7 @@ fn write(scene: &Scene, out: &mut String) -> std::fmt::Result {
     Ok(())
 }
 
-/// Six significant digits, without trailing zeros.
+/// To a millionth of its size, without trailing zeros.
 fn number(x: f64) -> String {
     let size = x.abs();
     if size != 0.0 && !(1e-4..1e7).contains(&size) {
@@ -118,7 +118,7 @@ fn number(x: f64) -> String {
     for places in 0..10 {
         let short = format!("{x:.places$}");
         if let Ok(back) = short.parse::<f64>()
-            && (back - x).abs() <= 5e-7 * size
+            && (back - x).abs() <= 1e-6 * size
         {
             text = short;
             break;

@@ -314,13 +314,10 @@ impl SceneDraft {
     fn patches(&self, warnings: &mut Vec<String>) -> Vec<Patch> {
         let (mut flat, mut twice, mut crossed) = (Tally::default(), Tally::default(), Tally::default());
         let mut seen = HashSet::with_capacity(self.faces.len());
-        // Parallelograms are final; triangles wait for partners. `order` keeps both in file order.
-        enum Slot {
-            Done(Patch),
-            Waiting(usize),
-        }
-        let mut order = Vec::with_capacity(self.faces.len());
+        // Patches in file order; a triangle's slot is emptied when it joins an earlier one.
+        let mut slots: Vec<Option<Patch>> = Vec::with_capacity(self.faces.len());
         let mut pieces: Vec<Piece> = Vec::new();
+        let mut slot_of: Vec<usize> = Vec::new();
         for face in &self.faces {
             let kept = distinct_corners(&face.corners);
             let corners: Vec<DVec3> = kept.iter().map(|&i| face.corners[i]).collect();
@@ -339,7 +336,7 @@ impl SceneDraft {
                 && polygon::is_parallelogram(quad)
             {
                 let four = |uv| Some([at(uv, 0)?, at(uv, 1)?, at(uv, 3)?, at(uv, 2)?]);
-                order.push(Slot::Done(Patch {
+                slots.push(Some(Patch {
                     shape: Shape::Parallelogram,
                     origin: quad[0],
                     u: quad[1] - quad[0],
@@ -364,32 +361,27 @@ impl SceneDraft {
                     continue;
                 }
                 let three = |uv| Some([at(uv, t[0])?, at(uv, t[1])?, at(uv, t[2])?]);
-                order.push(Slot::Waiting(pieces.len()));
-                pieces.push(Piece {
+                let piece = Piece {
                     corners: triangle,
                     uv: [three(&face.uv0), three(&face.uv1)],
                     group: (face.object, face.material),
                     face: face.index,
-                });
+                };
+                slot_of.push(slots.len());
+                slots.push(Some(lone(&piece)));
+                pieces.push(piece);
             }
         }
         flat.warn("zero-area face(s) dropped", warnings);
         twice.warn("duplicate face(s) dropped", warnings);
         crossed.warn("face(s) with an outline that crosses itself, cut into triangles as well as could be", warnings);
 
-        let mut made: Vec<Option<Patch>> = pieces.iter().map(|p| Some(lone(p))).collect();
         for pair in merge::pairs(&pieces) {
             let (first, second) = (pair.first.0 as usize, pair.second.0 as usize);
-            made[first] = Some(joined(&pieces[first], pair.first.1, &pieces[second], pair.second.1));
-            made[second] = None;
+            slots[slot_of[first]] = Some(joined(&pieces[first], pair.first.1, &pieces[second], pair.second.1));
+            slots[slot_of[second]] = None;
         }
-        order
-            .into_iter()
-            .filter_map(|slot| match slot {
-                Slot::Done(patch) => Some(patch),
-                Slot::Waiting(n) => made[n].take(),
-            })
-            .collect()
+        slots.into_iter().flatten().collect()
     }
 }
 
