@@ -28,7 +28,8 @@ pub struct Coupling {
     pub strength: f64,
     /// Result minus what the block predicts, at one test point in each child of the receiver.
     pub residual: [f64; CHILDREN],
-    /// How badly polynomials of this order fit K over the shooter, times strength: multiplies shooter detail.
+    /// How badly polynomials of this order fit K over the shooter, times strength, plus the mask's standard deviation
+    /// over the shooter: multiplies shooter detail.
     pub roughness: f64,
     /// Standard error of what the mask samples may have missed, times strength.
     pub unseen: f64,
@@ -63,6 +64,7 @@ pub fn couple<K: Kernel>(
     let mut moments = vec![0.0; (points.len() + tests.len()) * ns];
     let mut mask_sum = 0.0;
     let mut smooth_sum = 0.0;
+    let mut spread_sum = 0.0;
     let mut masked_sum = 0.0;
     for (q, x) in points.iter().chain(&tests).enumerate() {
         let row = &mut moments[q * ns..(q + 1) * ns];
@@ -70,11 +72,11 @@ pub fn couple<K: Kernel>(
         if masked {
             let whole = total(shooter_basis, row);
             if whole > 0.0 {
-                let mask = pair.mask(*x, settings.samples, seed::combine(key, q as u64));
+                let mask = pair.mask(*x, shooter_basis, row, settings.samples, seed::combine(key, q as u64));
                 mask_sum += mask * whole;
                 smooth_sum += whole;
+                spread_sum += whole * (mask * (1.0 - mask)).max(0.0).sqrt();
                 masked_sum += 1.0;
-                row.iter_mut().for_each(|m| *m *= mask);
             }
         }
     }
@@ -110,7 +112,9 @@ pub fn couple<K: Kernel>(
     } else {
         0.0
     };
-    let roughness = roughness(&pair, receiver, shooter, shooter_basis) * strength;
+    // detail of the shooter meets the misfit of K, and the mask's own variation over the shooter
+    let spread = spread_sum / (points.len() + tests.len()) as f64;
+    let roughness = roughness(&pair, receiver, shooter, shooter_basis) * strength + spread;
     let mut coupling = Coupling {
         block,
         orders: [receiver_basis.order() as u8, shooter_basis.order() as u8],

@@ -36,8 +36,9 @@ pub trait Pair {
         false
     }
 
-    /// Mean of the mask over the shooter seen from x, by at most `samples` samples drawn from `key`.
-    fn mask(&self, _x: [f64; 2], _samples: usize, _key: u64) -> f64 {
+    /// Turns the moments seen from x into masked moments, by at most `samples` samples of the mask drawn from `key`;
+    /// returns the mask's mean over the shooter, weighted with the kernel.
+    fn mask(&self, _x: [f64; 2], _basis: &CellBasis, _moments: &mut [f64], _samples: usize, _key: u64) -> f64 {
         1.0
     }
 }

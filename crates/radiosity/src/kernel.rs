@@ -174,6 +174,8 @@ impl LightKernel {
     }
 }
 
+/// Most functions of a basis.
+const MOST_FUNCTIONS: usize = CellBasis::MAX_MULTIWAVELET * CellBasis::MAX_MULTIWAVELET;
 /// Pieces closer than this many radii are split.
 const NEAR: f64 = 1.5;
 /// Deepest grading: pieces of 1/1024 of the source.
@@ -209,8 +211,8 @@ fn graded(
         return;
     }
     let rule = basis.analysis(basis.order() + 1);
-    let mut values = [0.0; CellBasis::MAX_MULTIWAVELET * CellBasis::MAX_MULTIWAVELET];
-    let mut sums = [0.0; CellBasis::MAX_MULTIWAVELET * CellBasis::MAX_MULTIWAVELET];
+    let mut values = [0.0; MOST_FUNCTIONS];
+    let mut sums = [0.0; MOST_FUNCTIONS];
     let mut whole = 0.0;
     // the first row of a nested basis's analysis is the quadrature rule itself
     for (y, w) in rule.points.iter().zip(&rule.matrix) {
@@ -307,44 +309,73 @@ impl Pair for LightPair<'_> {
         self.masked
     }
 
-    fn mask(&self, x: [f64; 2], samples: usize, key: u64) -> f64 {
+    fn mask(&self, x: [f64; 2], basis: &CellBasis, moments: &mut [f64], samples: usize, key: u64) -> f64 {
         let from = self.receiver.point(x);
-        let first = samples.min(FIRST_RAYS);
-        let (mut seen, mut whole) = self.rays(from, 0, first, key);
-        if samples > first && seen > 0.0 && seen < whole {
-            let (more_seen, more) = self.rays(from, first, samples, key);
-            seen += more_seen;
-            whole += more;
+        let mut seen = Seen::default();
+        self.cast(from, 0..samples.min(FIRST_RAYS), key, basis, &mut seen);
+        if seen.open > 0.0 && seen.open < seen.whole {
+            self.cast(from, samples.min(FIRST_RAYS)..samples, key, basis, &mut seen);
         }
-        if whole > 0.0 { seen / whole } else { 0.0 }
+        let mask = if seen.whole > 0.0 { seen.open / seen.whole } else { 0.0 };
+        // exact moments times the mean mask, plus the sampled covariance of mask and basis function
+        let unmasked = if basis.is_nested() { moments[0] } else { moments[..basis.len()].iter().sum() };
+        for (j, m) in moments.iter_mut().enumerate().take(basis.len()) {
+            *m *= mask;
+            if mask > 0.0 && mask < 1.0 {
+                *m += unmasked * (seen.open_moments[j] - mask * seen.whole_moments[j]) / seen.whole;
+            }
+        }
+        mask
     }
 }
 
 /// Rays that decide whether a point is in the open, in full shade or between; only then are more cast.
 const FIRST_RAYS: usize = 16;
 
+/// Kernel-weighted sums over rays: of those that arrive, and of all; plain and times each basis function.
+struct Seen {
+    open: f64,
+    whole: f64,
+    open_moments: [f64; MOST_FUNCTIONS],
+    whole_moments: [f64; MOST_FUNCTIONS],
+}
+
+impl Default for Seen {
+    fn default() -> Self {
+        Seen { open: 0.0, whole: 0.0, open_moments: [0.0; MOST_FUNCTIONS], whole_moments: [0.0; MOST_FUNCTIONS] }
+    }
+}
+
 impl LightPair<'_> {
-    /// Sums of kernel weights that arrive, and of all, over samples `from..to` of a low-discrepancy sequence.
-    fn rays(&self, x: DVec3, from: usize, to: usize, key: u64) -> (f64, f64) {
+    /// Adds the given samples of a low-discrepancy sequence over the shooter.
+    fn cast(&self, x: DVec3, samples: std::ops::Range<usize>, key: u64, basis: &CellBasis, seen: &mut Seen) {
         // R2 sequence (Roberts 2018), shifted by the pair's key
         const ALPHA: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
         let shift = [seed::unit(key), seed::unit(seed::combine(key, 1))];
-        let (mut seen, mut whole) = (0.0, 0.0);
-        for i in from..to {
+        let mut values = [0.0; MOST_FUNCTIONS];
+        self.kernel.rays.fetch_add(samples.len() as u64, Ordering::Relaxed);
+        for i in samples {
             let mut y: [f64; 2] = std::array::from_fn(|k| (shift[k] + ALPHA[k] * (i + 1) as f64).fract());
             if self.shooter.shape == CellShape::Triangle && y[0] + y[1] > 1.0 {
                 y = [1.0 - y[0], 1.0 - y[1]];
             }
             let point = self.shooter.point(y);
             let weight = density(x, self.receiver.normal, point, self.shooter.normal);
-            if weight > 0.0 {
-                whole += weight;
-                if !self.kernel.occluders.blocked(x, point, self.patches) {
-                    seen += weight;
+            if weight <= 0.0 {
+                continue;
+            }
+            let open = !self.kernel.occluders.blocked(x, point, self.patches);
+            basis.eval(y, &mut values);
+            seen.whole += weight;
+            if open {
+                seen.open += weight;
+            }
+            for j in 0..basis.len() {
+                seen.whole_moments[j] += weight * values[j];
+                if open {
+                    seen.open_moments[j] += weight * values[j];
                 }
             }
         }
-        self.kernel.rays.fetch_add((to - from) as u64, Ordering::Relaxed);
-        (seen, whole)
     }
 }

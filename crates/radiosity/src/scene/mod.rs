@@ -9,10 +9,16 @@
 //!   emits at its front, and its back is opaque black for every ray but those of the camera;
 //! * a two-sided material makes two [`Side`]s of one patch: two receivers and two emitters that share one geometry.
 
+mod describe;
 mod draft;
+mod emitter;
+mod merge;
+mod polygon;
 pub mod samples;
 
-pub use draft::{BuildOptions, DraftFace, SceneDraft, SceneError};
+pub use describe::describe;
+pub use draft::{BuildOptions, DraftFace, LARGEST_COORDINATE, MOST_CORNERS, SMALLEST_DIAGONAL, SceneDraft, SceneError};
+pub use emitter::Emitter;
 
 use crate::rgb::Rgb;
 use glam::DVec3;
@@ -177,6 +183,15 @@ pub struct Camera {
     pub up: DVec3,
     /// Vertical field of view in degrees.
     pub fov: f64,
+}
+
+impl Camera {
+    /// Whether it looks somewhere, at an angle that makes a picture.
+    pub fn is_usable(&self) -> bool {
+        let view = self.at - self.eye;
+        let finite = self.eye.is_finite() && self.at.is_finite() && self.up.is_finite();
+        finite && view.length() > 0.0 && view.cross(self.up).length() > 0.0 && self.fov > 0.0 && self.fov < 180.0
+    }
 }
 
 /// What a scene is: the input of the solver. Made by [`SceneDraft::build`] and never wrong.
