@@ -12,8 +12,9 @@
 //! ```
 //!
 //! Integers and floats are little-endian. There is one layout for given chunks, so equal solutions are equal files, and
-//! every byte is covered by a checksum or known to be zero. Nothing but the caller's chunks enters: no clock, thread count or
-//! path. What the chunks mean is the business of the code that reads and writes them; `docs/formats/onl.md` lists them.
+//! every byte is covered by a checksum or known to be zero. Nothing but the caller's chunks enters: no clock, thread
+//! count or path. What the chunks mean is the business of the code that reads and writes them; `docs/formats/onl.md`
+//! lists them.
 
 mod error;
 mod read;

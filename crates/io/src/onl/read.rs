@@ -120,8 +120,8 @@ impl ChunkFile {
         }
     }
 
-    /// An array that [`super::ChunkWriter::add_array`] wrote. Any bit pattern is accepted: for floats that must be numbers
-    /// see [`ChunkFile::finite_f64`].
+    /// An array that [`super::ChunkWriter::add_array`] wrote. Any bit pattern is accepted: for floats that must be
+    /// numbers see [`ChunkFile::finite_f64`].
     ///
     /// # Errors
     /// There is no such chunk, or its length is not a multiple of the element's.

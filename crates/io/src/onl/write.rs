@@ -9,7 +9,8 @@ use xxhash_rust::xxh3::xxh3_64;
 
 /// Collects named chunks and writes them as one `.onl` file.
 ///
-/// Names have one to eight printable ASCII characters and are used once. Chunks keep the order in which they were added.
+/// Names have one to eight printable ASCII characters and are used once. Chunks keep the order in which they were
+/// added.
 ///
 /// ```
 /// use ondelette_io::onl::{ChunkFile, ChunkWriter};

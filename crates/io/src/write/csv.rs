@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 /// A table written row by row; it appears under its name at [`CsvWriter::finish`] and not before.
 ///
-/// Numbers are printed in the fewest digits that read back as the same f64, integers without a point, very large and very
-/// small ones with an exponent (`1.5e-9`).
+/// Numbers are printed in the fewest digits that read back as the same f64, integers without a point, very large and
+/// very small ones with an exponent (`1.5e-9`).
 ///
 /// ```
 /// use ondelette_io::write::CsvWriter;

@@ -1,8 +1,8 @@
 //! Lit models: binary glTF 2.0 with vertex colours and an unlit material.
 //!
-//! One JSON chunk and one binary chunk. The material is `KHR_materials_unlit`: a viewer shows base colour times `COLOR_0`,
-//! takes both as linear, and encodes to sRGB itself. Colours are therefore *displayed* linear values in [0, 1], exposure and
-//! tone curve already applied ([`super::ToneMap::display`]); `asset.extras` says which.
+//! One JSON chunk and one binary chunk. The material is `KHR_materials_unlit`: a viewer shows base colour times
+//! `COLOR_0`, takes both as linear, and encodes to sRGB itself. Colours are therefore *displayed* linear values in [0,
+//! 1], exposure and tone curve already applied ([`super::ToneMap::display`]); `asset.extras` says which.
 
 use super::{WriteError, write_bytes};
 use ondelette_radiosity::scene::Camera;
@@ -155,7 +155,8 @@ impl Parts {
         let positions = self.add_accessor(json!({
             "bufferView": positions, "componentType": FLOAT, "count": n, "type": "VEC3", "min": low, "max": high,
         }));
-        // Four channels make eight bytes a vertex: three 16-bit ones would break the rule that elements start at multiples of 4.
+        // Four channels make eight bytes a vertex: three 16-bit ones would break the rule that elements start at
+        // multiples of 4.
         let colors = mesh.colors.iter().flat_map(|&[r, g, b]| [unorm(r), unorm(g), unorm(b), u16::MAX]);
         let colors = self.add_view(colors.flat_map(u16::to_le_bytes).collect(), ARRAY_BUFFER);
         let colors = self.add_accessor(json!({
@@ -202,8 +203,8 @@ impl Parts {
         // written so that a NaN anywhere is refused too
         if !(camera.eye.is_finite() && up.length() > 0.5 && fov > 0.0 && fov < std::f64::consts::PI) {
             return Err(format!(
-                "the camera (eye {}, at {}, up {}, fov {}) looks nowhere: eye and at must differ, up must not lie along the \
-                 view, fov must be between 0 and 180 degrees",
+                "the camera (eye {}, at {}, up {}, fov {}) looks nowhere: eye and at must differ, up must not lie \
+                 along the view, fov must be between 0 and 180 degrees",
                 camera.eye, camera.at, camera.up, camera.fov
             ));
         }

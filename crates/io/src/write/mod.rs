@@ -29,7 +29,8 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
     /// The folder that should hold the file is not there.
-    #[error("cannot write {}: the folder {} does not exist; create it or choose another place", path.display(), folder.display())]
+    #[error("cannot write {}: the folder {} does not exist; create it or choose another place",
+            path.display(), folder.display())]
     MissingFolder {
         /// The file asked for.
         path: PathBuf,

@@ -25,7 +25,8 @@ pub fn write_png(path: &Path, width: u32, height: u32, pixels: &[[u8; 3]]) -> Re
 }
 
 /// Writes `linear` pixels, row by row from the top left, as the EXR file `path`: 32-bit floats, channels R, G, B,
-/// ZIP-compressed, with `attributes` (name, value) such as exposure, quantity and unit in the header's `comments`, a line each.
+/// ZIP-compressed, with `attributes` (name, value) such as exposure, quantity and unit in the header's `comments`, a
+/// line each.
 ///
 /// # Errors
 /// `linear` does not hold `width * height` finite entries, a side is 0, or the file cannot be written.

@@ -4,8 +4,8 @@
 ///
 /// With L the luminance (Rec. 709 weights) times `exposure` and W = `white`, the displayed luminance is
 /// L (1 + L / W^2) / (1 + L): equation 4 of Reinhard, Stark, Shirley and Ferwerda, *Photographic Tone Reproduction for
-/// Digital Images*, 2002. L = W becomes white; W = 1 leaves L as it is; a large W keeps every highlight. Colours keep their
-/// ratios and are clamped to [0, 1] channel by channel.
+/// Digital Images*, 2002. L = W becomes white; W = 1 leaves L as it is; a large W keeps every highlight. Colours keep
+/// their ratios and are clamped to [0, 1] channel by channel.
 ///
 /// ```
 /// use ondelette_io::write::ToneMap;
@@ -31,8 +31,8 @@ fn luminance(linear: [f32; 3]) -> f64 {
 const KEY: f64 = 0.18;
 
 impl ToneMap {
-    /// The curve for a picture: its log-average luminance (black and non-finite pixels left out) becomes middle grey 0.18,
-    /// and the brightest hundredth of the lit pixels becomes white.
+    /// The curve for a picture: its log-average luminance (black and non-finite pixels left out) becomes middle grey
+    /// 0.18, and the brightest hundredth of the lit pixels becomes white.
     ///
     /// Depends on the multiset of pixels alone, but for rounding in the mean; a black picture gets exposure 1. Cost
     /// O(n log n) for n pixels.
