@@ -1,6 +1,6 @@
 //! The list of checks, in one place.
 
-use crate::{layers, source};
+use crate::{layers, links, source};
 use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
@@ -54,6 +54,7 @@ pub(crate) fn layers(root: &Path) -> Result<(), String> {
             println!("note: {note}");
         }
     }
+    faults.extend(links::faults(root)?);
     if faults.is_empty() {
         println!("layers: {} source files keep to the architecture", sources.len());
         return Ok(());

@@ -7,6 +7,7 @@
 
 mod ci;
 mod layers;
+mod links;
 mod source;
 
 use std::path::{Path, PathBuf};

@@ -1,9 +1,10 @@
 //! Writing the container.
 
 use super::{ALIGNMENT, ENTRY, HEADER, MAGIC, VERSION, table_checksum};
-use crate::write::{WriteError, write_bytes};
+use crate::write::{AtomicFile, WriteError};
 use bytemuck::NoUninit;
 use serde::Serialize;
+use std::io::{self, Write};
 use std::path::Path;
 use xxhash_rust::xxh3::xxh3_64;
 
@@ -74,8 +75,24 @@ impl ChunkWriter {
     /// The bytes of the file: a function of the chunks alone. Cost O(bytes).
     ///
     /// # Panics
-    /// If there are more than 2^32 chunks.
+    /// If there are 2^32 chunks or more.
     pub fn to_bytes(&self) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        self.put(&mut bytes).expect("memory takes every byte");
+        bytes
+    }
+
+    /// Writes the file `path`, whole or not at all, without a second copy of the chunks in memory.
+    ///
+    /// # Errors
+    /// As [`AtomicFile::create`] and [`AtomicFile::commit`].
+    pub fn write(&self, path: &Path) -> Result<(), WriteError> {
+        let mut file = AtomicFile::create(path)?;
+        self.put(&mut file).map_err(|e| file.refused("writing", e))?;
+        file.commit()
+    }
+
+    fn put(&self, out: &mut impl Write) -> io::Result<()> {
         let mut end = HEADER + self.chunks.len() * ENTRY;
         let mut table = Vec::with_capacity(self.chunks.len() * ENTRY);
         for (name, bytes) in &self.chunks {
@@ -87,27 +104,22 @@ impl ChunkWriter {
             end = offset + bytes.len();
         }
         let count = u32::try_from(self.chunks.len()).expect("fewer than 2^32 chunks");
-        let mut file = Vec::with_capacity(end);
-        file.extend(MAGIC);
-        file.extend(VERSION.to_le_bytes());
-        file.extend(count.to_le_bytes());
-        file.extend((end as u64).to_le_bytes());
-        file.resize(HEADER, 0);
-        let checksum = table_checksum(&file, &table);
-        file[32..40].copy_from_slice(&checksum.to_le_bytes());
-        file.extend(table);
+        let mut header = MAGIC.to_vec();
+        header.extend(VERSION.to_le_bytes());
+        header.extend(count.to_le_bytes());
+        header.extend((end as u64).to_le_bytes());
+        header.resize(HEADER, 0);
+        let checksum = table_checksum(&header, &table);
+        header[32..40].copy_from_slice(&checksum.to_le_bytes());
+        out.write_all(&header)?;
+        out.write_all(&table)?;
+        let mut at = HEADER + table.len();
         for (_, bytes) in &self.chunks {
-            file.resize(file.len().next_multiple_of(ALIGNMENT), 0);
-            file.extend(bytes);
+            let start = at.next_multiple_of(ALIGNMENT);
+            out.write_all(&[0; ALIGNMENT][..start - at])?;
+            out.write_all(bytes)?;
+            at = start + bytes.len();
         }
-        file
-    }
-
-    /// Writes the file `path`, whole or not at all.
-    ///
-    /// # Errors
-    /// As [`write_bytes`].
-    pub fn write(&self, path: &Path) -> Result<(), WriteError> {
-        write_bytes(path, &self.to_bytes())
+        Ok(())
     }
 }

@@ -101,7 +101,7 @@ impl AtomicFile {
     }
 
     /// The error for a step that the system refused.
-    pub(super) fn refused(&self, doing: &'static str, source: io::Error) -> WriteError {
+    pub(crate) fn refused(&self, doing: &'static str, source: io::Error) -> WriteError {
         WriteError::Refused { path: self.path.clone(), doing, source }
     }
 

@@ -27,6 +27,17 @@ pub struct CsvWriter {
     line: String,
 }
 
+/// One cell of a row that does not hold numbers alone.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Cell<'a> {
+    /// A finite number.
+    Number(f64),
+    /// A name; put in quotes where it must be.
+    Text(&'a str),
+    /// Nothing: the column does not apply to this row.
+    Empty,
+}
+
 impl CsvWriter {
     /// Starts the table `path` with its header line.
     ///
@@ -45,25 +56,41 @@ impl CsvWriter {
         Ok(table)
     }
 
-    /// Adds one row.
+    /// Adds one row of numbers.
     ///
     /// # Errors
     /// The number of values is not that of the header, a value is not finite, or the disk refuses.
     pub fn row(&mut self, values: &[f64]) -> Result<(), WriteError> {
-        if values.len() != self.columns {
-            let reason = format!("row {} has {} values, the header {}", self.rows + 1, values.len(), self.columns);
+        self.put_row(values.iter().map(|&value| Cell::Number(value)))
+    }
+
+    /// Adds one row of numbers, texts and gaps.
+    ///
+    /// # Errors
+    /// As [`CsvWriter::row`].
+    pub fn row_of(&mut self, cells: &[Cell<'_>]) -> Result<(), WriteError> {
+        self.put_row(cells.iter().copied())
+    }
+
+    fn put_row<'a>(&mut self, cells: impl ExactSizeIterator<Item = Cell<'a>>) -> Result<(), WriteError> {
+        if cells.len() != self.columns {
+            let reason = format!("row {} has {} values, the header {}", self.rows + 1, cells.len(), self.columns);
             return Err(WriteError::data(&self.path, reason));
         }
         self.line.clear();
-        for (i, &value) in values.iter().enumerate() {
-            if !value.is_finite() {
-                let reason = format!("row {}, column {}: the value is {value}", self.rows + 1, i + 1);
-                return Err(WriteError::data(&self.path, reason));
-            }
+        for (i, cell) in cells.enumerate() {
             if i > 0 {
                 self.line.push(',');
             }
-            self.line.push_str(&shortest(value));
+            match cell {
+                Cell::Number(value) if value.is_finite() => self.line.push_str(&shortest(value)),
+                Cell::Number(value) => {
+                    let reason = format!("row {}, column {}: the value is {value}", self.rows + 1, i + 1);
+                    return Err(WriteError::data(&self.path, reason));
+                }
+                Cell::Text(text) => self.line.push_str(&quoted(text)),
+                Cell::Empty => {}
+            }
         }
         self.rows += 1;
         self.put_line()
@@ -123,6 +150,18 @@ mod tests {
         assert!(nan.contains("row 2, column 2") && nan.contains("NaN"), "{nan}");
         drop(table);
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn names_and_gaps_keep_their_columns() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("elements.csv");
+        let mut table = CsvWriter::create(&path, &["object", "level", "area, m^2"]).unwrap();
+        table.row_of(&[Cell::Text("wall, left"), Cell::Number(3.0), Cell::Number(1e-9)]).unwrap();
+        table.row_of(&[Cell::Text("lamp"), Cell::Empty, Cell::Number(0.25)]).unwrap();
+        table.finish().unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert_eq!(text, "object,level,\"area, m^2\"\n\"wall, left\",3,1e-9\nlamp,,0.25\n");
     }
 
     #[test]

@@ -10,7 +10,7 @@ mod picture;
 mod tone;
 
 pub use atomic::{AtomicFile, check_writable, create_folder, write_bytes};
-pub use csv::CsvWriter;
+pub use csv::{Cell, CsvWriter};
 pub use glb::{LitMesh, LitModel, ModelNote, glb_bytes, write_glb};
 pub use picture::{exr_bytes, png_bytes, write_exr, write_png};
 pub use tone::ToneMap;
