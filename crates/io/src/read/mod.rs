@@ -5,6 +5,7 @@
 
 pub mod builtin;
 mod error;
+mod gltf;
 mod mtl;
 mod obj;
 
@@ -55,6 +56,7 @@ fn read_draft(path: &Path) -> Result<SceneDraft, ReadError> {
     let ending = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
     match ending.as_deref() {
         Some("obj") => obj::read(path),
+        Some("gltf" | "glb") => gltf::read(path),
         _ => Err(ReadError::Ending { path: path.into() }),
     }
 }

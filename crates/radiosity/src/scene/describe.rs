@@ -115,7 +115,7 @@ fn number(x: f64) -> String {
         return format!("{x:.5e}");
     }
     let mut text = x.to_string();
-    for places in 0..10 {
+    for places in 0..16 {
         let short = format!("{x:.places$}");
         if let Ok(back) = short.parse::<f64>()
             && (back - x).abs() <= 1e-6 * size
