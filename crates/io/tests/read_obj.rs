@@ -113,13 +113,34 @@ fn what_the_file_leaves_open_is_assumed_aloud() {
     assert_eq!(scene.material(scene.sides[0]).reflectance.0, [0.5; 3]);
     assert!(scene.warnings[0].contains("1 face without a material"), "{:?}", scene.warnings);
     assert!(scene.warnings[1].contains("2 statements ignored") && scene.warnings[1].contains("'l' at line 6"));
-    let scene =
-        read(&format!("mtllib m.mtl\n{SQUARE}usemtl a\nf 1 2 3 4\n"), Some("newmtl a\nd 0.5\nmap_Kd wood.png\n"))
-            .unwrap();
+    let scene = read(&format!("mtllib m.mtl\n{SQUARE}usemtl a\nf 1 2 3 4\n"), Some("newmtl a\nd 0.5\n")).unwrap();
     let all = scene.warnings.join("\n");
-    for word in ["map_Kd", "transparent", "states no Kd"] {
+    for word in ["transparent", "states no Kd"] {
         assert!(all.contains(word), "no word about '{word}' in:\n{all}");
     }
+}
+
+/// A texture darkens its material by its mean in linear light; an exporter's Kd 1 beside it is legal.
+#[test]
+fn textures_count_with_their_mean() {
+    let folder = tempfile::tempdir().unwrap();
+    let checks = image::RgbImage::from_fn(4, 4, |x, y| image::Rgb([if (x + y) % 2 == 0 { 255 } else { 0 }; 3]));
+    checks.save(folder.path().join("dark checks.png")).unwrap();
+    let obj = folder.path().join("s.obj");
+    std::fs::write(&obj, format!("mtllib m.mtl\nusemtl a\n{SQUARE}f 1 2 3 4\n")).unwrap();
+    let read = |mtl: &str| {
+        std::fs::write(folder.path().join("m.mtl"), mtl).unwrap();
+        read_scene(&obj, &ReadOptions::default())
+    };
+    let scene = read("newmtl a\nKd 1 0.5 0\nKe 4 4 4\nmap_Kd dark checks.png\nmap_Ke dark checks.png\n").unwrap();
+    assert_eq!(scene.materials[0].reflectance.0, [0.5, 0.25, 0.0]);
+    assert_eq!(scene.materials[0].radiance.0, [2.0; 3]);
+    let gone = read("newmtl a\nKd 0.5 0.5 0.5\nmap_Kd -s 2 2 1 gone.png\n").unwrap_err().to_string();
+    assert!(gone.contains("m.mtl:3:") && gone.contains("gone.png") && gone.contains("'a'"), "{gone}");
+    std::fs::write(folder.path().join("wood.tga"), "no picture").unwrap();
+    let scene = read("newmtl a\nKd 0.8 0.8 0.8\nmap_Kd wood.tga\n").unwrap();
+    assert_eq!(scene.materials[0].reflectance.0, [0.4; 3]);
+    assert!(scene.warnings[0].contains("neither PNG nor JPEG") && scene.warnings[0].contains("'a'"));
 }
 
 #[test]

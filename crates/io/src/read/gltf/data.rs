@@ -9,7 +9,7 @@ use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 /// Elements of an accessor without a buffer view (all zero) beyond this are refused.
-const MOST_ZEROS: usize = 1 << 24;
+const MOST_ZEROS: usize = 1 << 22;
 
 /// The bytes of a file and of all that it refers to.
 pub(super) struct Data<'a> {
