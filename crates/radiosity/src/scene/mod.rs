@@ -9,6 +9,7 @@
 //!   emits at its front, and its back is opaque black for every ray but those of the camera;
 //! * a two-sided material makes two [`Side`]s of one patch: two receivers and two emitters that share one geometry.
 
+mod check;
 mod describe;
 mod draft;
 mod emitter;
