@@ -37,7 +37,43 @@ pub struct SideFrame {
 pub struct LightKernel {
     sides: Vec<SideFrame>,
     occluders: Occluders,
+    /// Front and back side of each patch.
+    of_patch: Vec<[Option<u32>; 2]>,
     rays: AtomicU64,
+}
+
+impl SideFrame {
+    /// Side-local coordinates of the point of the side that is closest to `point`.
+    pub fn closest(&self, point: DVec3) -> [f64; 2] {
+        let [u, v] = self.edges;
+        let d = point - self.origin;
+        let n = u.cross(v);
+        let inverse = 1.0 / n.length_squared();
+        let [s, t] = [v.cross(n).dot(d) * inverse, n.cross(u).dot(d) * inverse];
+        let triangle = self.shape == CellShape::Triangle;
+        let inside = s >= 0.0 && t >= 0.0 && if triangle { s + t <= 1.0 } else { s <= 1.0 && t <= 1.0 };
+        if inside {
+            return [s, t];
+        }
+        // the closest point of each edge, in local coordinates
+        let edges: &[[[f64; 2]; 2]] = if triangle {
+            &[[[0.0, 0.0], [1.0, 0.0]], [[1.0, 0.0], [0.0, 1.0]], [[0.0, 1.0], [0.0, 0.0]]]
+        } else {
+            &[[[0.0, 0.0], [1.0, 0.0]], [[1.0, 0.0], [1.0, 1.0]], [[1.0, 1.0], [0.0, 1.0]], [[0.0, 1.0], [0.0, 0.0]]]
+        };
+        let place = |x: [f64; 2]| self.origin + u * x[0] + v * x[1];
+        let mut best = ([0.0; 2], f64::INFINITY);
+        for [a, b] in edges {
+            let (p, q) = (place(*a), place(*b));
+            let k = ((point - p).dot(q - p) / (q - p).length_squared()).clamp(0.0, 1.0);
+            let at = [a[0] + k * (b[0] - a[0]), a[1] + k * (b[1] - a[1])];
+            let distance = place(at).distance(point);
+            if distance < best.1 {
+                best = (at, distance);
+            }
+        }
+        best.0
+    }
 }
 
 /// A cell in space.
@@ -75,8 +111,13 @@ impl Element {
         }
     }
 
+    /// Unit normal of the front.
+    pub fn normal(&self) -> DVec3 {
+        self.normal
+    }
+
     /// Centre and radius of a ball around it.
-    fn ball(&self) -> (DVec3, f64) {
+    pub fn ball(&self) -> (DVec3, f64) {
         let [u, v] = self.edges;
         match self.shape {
             CellShape::Triangle => {
@@ -112,7 +153,11 @@ impl LightKernel {
                 }
             })
             .collect();
-        LightKernel { sides, occluders: Occluders::new(scene), rays: AtomicU64::new(0) }
+        let mut of_patch = vec![[None; 2]; scene.patches.len()];
+        for (i, side) in scene.sides.iter().enumerate() {
+            of_patch[side.patch as usize][usize::from(side.back)] = Some(i as u32);
+        }
+        LightKernel { sides, occluders: Occluders::new(scene), of_patch, rays: AtomicU64::new(0) }
     }
 
     /// The sides, in scene order.
@@ -123,6 +168,33 @@ impl LightKernel {
     /// What blocks light.
     pub fn occluders(&self) -> &Occluders {
         &self.occluders
+    }
+
+    /// The front or back side of a patch, if it has one.
+    pub fn side_of(&self, patch: u32, back: bool) -> Option<usize> {
+        self.of_patch[patch as usize][usize::from(back)].map(|s| s as usize)
+    }
+
+    /// Form factor from a free point to an element, and the share of it that is visible.
+    pub fn visible_factor(&self, x: DVec3, n: DVec3, shooter: &Cell, key: u64) -> (f64, f64) {
+        let element = self.element(shooter);
+        let factor = point_to_polygon(x, n, &element.polygon().clipped(x, n));
+        if factor <= 0.0 {
+            return (0.0, 0.0);
+        }
+        let patch = self.sides[shooter.root as usize].patch;
+        let (mut open, mut whole) = (0.0, 0.0);
+        for y in sequence(key, element.shape, 0..FREE_RAYS) {
+            let point = element.point(y);
+            let weight = density(x, n, point, element.normal);
+            if weight > 0.0 {
+                whole += weight;
+                if !self.occluders.blocked(x, point, [patch, patch]) {
+                    open += weight;
+                }
+            }
+        }
+        (factor, if whole > 0.0 { open / whole } else { 0.0 })
     }
 
     /// Visibility rays cast so far: a sum, the same in whatever order the threads add to it.
@@ -329,6 +401,19 @@ impl Pair for LightPair<'_> {
     }
 }
 
+/// Rays from a free point to one element.
+const FREE_RAYS: usize = 16;
+
+/// Low-discrepancy points of a cell: the R2 sequence (Roberts 2018), shifted by a key.
+fn sequence(key: u64, shape: CellShape, range: std::ops::Range<usize>) -> impl Iterator<Item = [f64; 2]> {
+    const ALPHA: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
+    let shift = [seed::unit(key), seed::unit(seed::combine(key, 1))];
+    range.map(move |i| {
+        let y: [f64; 2] = std::array::from_fn(|k| (shift[k] + ALPHA[k] * (i + 1) as f64).fract());
+        if shape == CellShape::Triangle && y[0] + y[1] > 1.0 { [1.0 - y[0], 1.0 - y[1]] } else { y }
+    })
+}
+
 /// Rays that decide whether a point is in the open, in full shade or between; only then are more cast.
 const FIRST_RAYS: usize = 16;
 
@@ -349,16 +434,9 @@ impl Default for Seen {
 impl LightPair<'_> {
     /// Adds the given samples of a low-discrepancy sequence over the shooter.
     fn cast(&self, x: DVec3, samples: std::ops::Range<usize>, key: u64, basis: &CellBasis, seen: &mut Seen) {
-        // R2 sequence (Roberts 2018), shifted by the pair's key
-        const ALPHA: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
-        let shift = [seed::unit(key), seed::unit(seed::combine(key, 1))];
         let mut values = [0.0; MOST_FUNCTIONS];
         self.kernel.rays.fetch_add(samples.len() as u64, Ordering::Relaxed);
-        for i in samples {
-            let mut y: [f64; 2] = std::array::from_fn(|k| (shift[k] + ALPHA[k] * (i + 1) as f64).fract());
-            if self.shooter.shape == CellShape::Triangle && y[0] + y[1] > 1.0 {
-                y = [1.0 - y[0], 1.0 - y[1]];
-            }
+        for y in sequence(key, self.shooter.shape, samples) {
             let point = self.shooter.point(y);
             let weight = density(x, self.receiver.normal, point, self.shooter.normal);
             if weight <= 0.0 {

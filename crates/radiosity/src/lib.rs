@@ -2,12 +2,15 @@
 
 pub mod form_factor;
 pub mod kernel;
+pub mod ledger;
 pub mod occluder;
+pub mod probe;
 mod rgb;
 pub mod scene;
 pub mod settings;
 pub mod solution;
 pub mod solver;
+pub mod view;
 
 pub use rgb::Rgb;
 pub use scene::Scene;

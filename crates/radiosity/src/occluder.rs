@@ -135,8 +135,9 @@ impl Occluders {
         })
     }
 
-    /// The first patch along a ray, leaving out one patch (where the ray starts).
-    pub fn first_hit(&self, from: DVec3, direction: DVec3, except: Option<u32>) -> Option<Hit> {
+    /// The first patch along a ray, leaving out what `skips(patch, hit from the front)` says (where the ray starts; backs
+    /// that cameras look through).
+    pub fn first_hit(&self, from: DVec3, direction: DVec3, skips: impl Fn(u32, bool) -> bool) -> Option<Hit> {
         let narrow = |v: DVec3| Vec3A::new(v.x as f32, v.y as f32, v.z as f32);
         let ray = Ray::new(narrow(from), narrow(direction), 0.0, f32::INFINITY);
         let least = RELATIVE_EPSILON * self.scale / direction.length();
@@ -144,11 +145,9 @@ impl Occluders {
         let mut hit = RayHit::none();
         self.wide.ray_traverse(ray, &mut hit, |_, id| {
             let patch = self.wide.primitive_indices[id];
-            if Some(patch) == except {
-                return f32::INFINITY;
-            }
-            match self.facets[patch as usize].crossing(from, direction) {
-                Some(t) if t > least => {
+            let facet = &self.facets[patch as usize];
+            match facet.crossing(from, direction) {
+                Some(t) if t > least && !skips(patch, facet.normal.dot(direction) < 0.0) => {
                     // ties go to the lower index, whatever the order of traversal
                     if nearest.is_none_or(|(best, at)| t < best || (t == best && patch < at)) {
                         nearest = Some((t, patch));
@@ -164,6 +163,29 @@ impl Occluders {
         let p = from + direction * t - facet.origin;
         let at = [facet.to_s.dot(p).clamp(0.0, 1.0), facet.to_t.dot(p).clamp(0.0, 1.0)];
         Some(Hit { patch, t, at, front: facet.normal.dot(direction) < 0.0 })
+    }
+
+    /// All patches whose boxes come within `radius` of a point, ascending.
+    pub fn near(&self, point: DVec3, radius: f64) -> Vec<u32> {
+        let mut found = Vec::new();
+        let mut stack = if self.binary.nodes.is_empty() { Vec::new() } else { vec![0u32] };
+        let wide = |v: Vec3A| DVec3::new(f64::from(v.x), f64::from(v.y), f64::from(v.z));
+        while let Some(n) = stack.pop() {
+            let node = &self.binary.nodes[n as usize];
+            let nearest = point.clamp(wide(node.aabb.min), wide(node.aabb.max));
+            if nearest.distance(point) > radius {
+                continue;
+            }
+            if node.prim_count == 0 {
+                stack.push(node.first_index);
+                stack.push(node.first_index + 1);
+            } else {
+                let range = node.first_index as usize..(node.first_index + node.prim_count) as usize;
+                found.extend_from_slice(&self.binary.primitive_indices[range]);
+            }
+        }
+        found.sort_unstable();
+        found
     }
 
     /// All patches that may reach into the shaft, without the two given ones.

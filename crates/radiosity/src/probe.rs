@@ -1,0 +1,108 @@
+//! Reading a solution at points: on its surfaces, or gathered at free points.
+
+use crate::kernel::LightKernel;
+use crate::rgb::Rgb;
+use crate::solution::Solution;
+use glam::DVec3;
+use ondelette_compress::NodeId;
+use ondelette_numerics::seed;
+
+/// Finds surfaces under points, and gathers irradiance at free points.
+pub struct Prober<'a> {
+    solution: &'a Solution,
+    kernel: LightKernel,
+    /// Radiosity means of all nodes, for gathering.
+    means: Vec<Rgb>,
+}
+
+/// A point belongs to a surface within this share of the scene's diagonal.
+pub const REACH: f64 = 1e-5;
+/// ... if its normal and the surface's enclose less than 60 degrees.
+const FACING: f64 = 0.5;
+/// A gathered element is small enough when its radius is this share of its distance.
+const SMALL: f64 = 0.25;
+
+impl<'a> Prober<'a> {
+    /// Prepares a solution. Cost: building its ray structure.
+    pub fn new(solution: &'a Solution) -> Self {
+        let forest = solution.forest();
+        let mut means = vec![Rgb::BLACK; forest.len()];
+        solution.each_leaf(|leaf, side, _, mean| {
+            let material = solution.scene().material(solution.scene().sides[side]);
+            means[leaf] = material.radiance * std::f64::consts::PI + material.reflectance * mean;
+        });
+        for n in (0..forest.len()).rev() {
+            let id = NodeId(n as u32);
+            if !forest.is_leaf(id) {
+                let arity = forest.node(id).cell.shape.arity();
+                for c in 0..arity {
+                    let child = means[forest.child(id, c).index()];
+                    means[n] += child * (1.0 / arity as f64);
+                }
+            }
+        }
+        Prober { solution, kernel: LightKernel::new(solution.scene()), means }
+    }
+
+    /// The side under a point whose normal faces the same way, and the side-local coordinates there.
+    ///
+    /// The nearest side within [`REACH`] of the scene's diagonal; ties, at edges, go to the lower side.
+    pub fn find(&self, point: DVec3, normal: DVec3) -> Option<(usize, [f64; 2])> {
+        let reach = REACH * self.solution.scene().diagonal();
+        let normal = normal.normalize_or_zero();
+        let mut best: Option<(f64, usize, [f64; 2])> = None;
+        for patch in self.kernel.occluders().near(point, reach) {
+            for back in [false, true] {
+                let Some(side) = self.kernel.side_of(patch, back) else { continue };
+                let frame = &self.kernel.sides()[side];
+                if frame.normal.dot(normal) < FACING {
+                    continue;
+                }
+                let at = frame.closest(point);
+                let distance = (frame.origin + frame.edges[0] * at[0] + frame.edges[1] * at[1]).distance(point);
+                // closer than a thousandth of the reach counts as touching: rounding must not decide ties
+                let distance = if distance < 1e-3 * reach { 0.0 } else { distance };
+                let better = best.is_none_or(|(d, s, _)| distance < d || (distance == d && side < s));
+                if distance <= reach && better {
+                    best = Some((distance, side, at));
+                }
+            }
+        }
+        best.map(|(_, side, at)| (side, at))
+    }
+
+    /// Irradiance at a free point with a unit normal, gathered from the solved scene: elements in closed form, their
+    /// visibility by rays keyed by point and element.
+    pub fn gather(&self, point: DVec3, normal: DVec3) -> Rgb {
+        let normal = normal.normalize_or_zero();
+        let key = seed::combine(point.x.to_bits(), seed::combine(point.y.to_bits(), point.z.to_bits()));
+        let mut sum = Rgb::BLACK;
+        for &root in self.solution.forest().roots() {
+            self.gather_from(root, point, normal, key, &mut sum);
+        }
+        sum
+    }
+
+    fn gather_from(&self, id: NodeId, point: DVec3, normal: DVec3, key: u64, sum: &mut Rgb) {
+        let forest = self.solution.forest();
+        let node = forest.node(id);
+        let radiosity = self.means[id.index()];
+        if radiosity.max() <= 0.0 {
+            return;
+        }
+        let element = self.kernel.element(&node.cell);
+        let (centre, radius) = element.ball();
+        if normal.dot(centre - point) < -radius || element.normal().dot(point - centre) <= 0.0 {
+            return;
+        }
+        let distance = centre.distance(point);
+        if !forest.is_leaf(id) && radius > SMALL * distance {
+            for c in 0..node.cell.shape.arity() {
+                self.gather_from(forest.child(id, c), point, normal, key, sum);
+            }
+            return;
+        }
+        let (factor, open) = self.kernel.visible_factor(point, normal, &node.cell, seed::combine(key, node.cell.key));
+        *sum += radiosity * (factor * open);
+    }
+}
