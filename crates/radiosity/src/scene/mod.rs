@@ -43,6 +43,22 @@ impl Quantity {
         }
     }
 
+    /// What radiance is called.
+    pub fn radiance_name(self) -> &'static str {
+        match self {
+            Quantity::Radiometric => "radiance",
+            Quantity::Photometric => "luminance",
+        }
+    }
+
+    /// What irradiance is called.
+    pub fn irradiance_name(self) -> &'static str {
+        match self {
+            Quantity::Radiometric => "irradiance",
+            Quantity::Photometric => "illuminance",
+        }
+    }
+
     /// Unit of emitted radiance (luminance).
     pub fn radiance_unit(self) -> &'static str {
         match self {
