@@ -28,9 +28,10 @@ pub struct Coupling {
     pub strength: f64,
     /// Result minus what the block predicts, at one test point in each child of the receiver.
     pub residual: [f64; CHILDREN],
-    /// How badly polynomials of this order fit K over the shooter, times strength, plus the mask's standard deviation
-    /// over the shooter: multiplies shooter detail.
+    /// How badly polynomials of this order fit K over the shooter, times strength: multiplies shooter detail.
     pub roughness: f64,
+    /// Standard deviation of the masked kernel over the shooter: multiplies shooter detail.
+    pub spread: f64,
     /// Standard error of what the mask samples may have missed, times strength.
     pub unseen: f64,
     /// Whether mask samples were taken.
@@ -61,23 +62,23 @@ pub fn couple<K: Kernel>(
 
     // samples of the result: masked moments at the fit points and at the test points
     let tests = receiver.shape.test_points();
-    let mut moments = vec![0.0; (points.len() + tests.len()) * ns];
-    let mut mask_sum = 0.0;
-    let mut smooth_sum = 0.0;
-    let mut spread_sum = 0.0;
-    let mut masked_sum = 0.0;
-    for (q, x) in points.iter().chain(&tests).enumerate() {
-        let row = &mut moments[q * ns..(q + 1) * ns];
+    let places: Vec<[f64; 2]> = points.iter().chain(&tests).copied().collect();
+    let mut moments = vec![0.0; places.len() * ns];
+    for (x, row) in places.iter().zip(moments.chunks_mut(ns)) {
         pair.moments(*x, shooter_basis, row);
-        if masked {
-            let whole = total(shooter_basis, row);
-            if whole > 0.0 {
-                let mask = pair.mask(*x, shooter_basis, row, settings.samples, seed::combine(key, q as u64));
-                mask_sum += mask * whole;
-                smooth_sum += whole;
-                spread_sum += whole * (mask * (1.0 - mask)).max(0.0).sqrt();
-                masked_sum += 1.0;
-            }
+    }
+    let mut seen = MaskSums::default();
+    let mut mask_samples = 0;
+    if masked {
+        let smooth = moments.clone();
+        // all points with few samples first; only where they disagree is the pair worth the rest. A point must not decide
+        // for itself: stopping when its first samples agree would bias the mask towards 0 and 1.
+        mask_samples = settings.samples.min(FIRST_SAMPLES);
+        seen = MaskSums::take(&pair, &places, shooter_basis, &mut moments, mask_samples, key);
+        if seen.is_mixed() && settings.samples > mask_samples {
+            moments = smooth;
+            mask_samples = settings.samples;
+            seen = MaskSums::take(&pair, &places, shooter_basis, &mut moments, mask_samples, key);
         }
     }
 
@@ -104,30 +105,75 @@ pub fn couple<K: Kernel>(
         residual[t] = total(shooter_basis, &moments[q * ns..(q + 1) * ns]) - predicted;
     }
 
-    let unseen = if masked && smooth_sum > 0.0 {
+    let unseen = if seen.smooth > 0.0 {
         // binomial error of a mask seen by N samples in all, with one pretended sample of the other kind
-        let n = masked_sum * settings.samples as f64;
-        let p = ((mask_sum / smooth_sum) * n + 0.5) / (n + 1.0);
-        (p * (1.0 - p) / n).sqrt() * smooth_sum / masked_sum
+        let n = seen.points * mask_samples as f64;
+        let p = ((seen.open / seen.smooth) * n + 0.5) / (n + 1.0);
+        (p * (1.0 - p) / n).sqrt() * seen.smooth / seen.points
     } else {
         0.0
     };
     // detail of the shooter meets the misfit of K, and the mask's own variation over the shooter
-    let spread = spread_sum / (points.len() + tests.len()) as f64;
-    let roughness = roughness(&pair, receiver, shooter, shooter_basis) * strength + spread;
+    let spread = seen.spread / places.len() as f64;
+    let roughness = roughness(&pair, receiver, shooter, shooter_basis) * strength;
     let mut coupling = Coupling {
         block,
         orders: [receiver_basis.order() as u8, shooter_basis.order() as u8],
         strength,
         residual,
         roughness,
+        spread,
         unseen,
         masked,
-        kernel_samples: ((points.len() + tests.len()) * ns) as u32,
-        mask_points: if masked { (points.len() + tests.len()) as u32 } else { 0 },
+        kernel_samples: (places.len() * ns) as u32,
+        mask_points: if masked { places.len() as u32 } else { 0 },
     };
     truncate(&mut coupling, receiver_basis, shooter_basis, settings.negligible);
     Some(coupling)
+}
+
+/// Mask samples of a point that decide whether a pair needs more.
+const FIRST_SAMPLES: usize = 16;
+
+/// Sums over the receiver points of a masked pair, each weighted with what the point would receive unmasked.
+#[derive(Default)]
+struct MaskSums {
+    /// Of the mask.
+    open: f64,
+    /// Of 1.
+    smooth: f64,
+    /// Of the mask's standard deviation over the shooter.
+    spread: f64,
+    /// Number of points that would receive anything.
+    points: f64,
+}
+
+impl MaskSums {
+    fn take<P: Pair>(
+        pair: &P,
+        places: &[[f64; 2]],
+        basis: &CellBasis,
+        moments: &mut [f64],
+        samples: usize,
+        key: u64,
+    ) -> Self {
+        let mut sums = MaskSums::default();
+        for (q, (x, row)) in places.iter().zip(moments.chunks_mut(basis.len())).enumerate() {
+            let whole = total(basis, row);
+            if whole > 0.0 {
+                let mask = pair.mask(*x, basis, row, samples, seed::combine(key, q as u64));
+                sums.open += mask * whole;
+                sums.smooth += whole;
+                sums.spread += whole * (mask * (1.0 - mask)).max(0.0).sqrt();
+                sums.points += 1.0;
+            }
+        }
+        sums
+    }
+
+    fn is_mixed(&self) -> bool {
+        self.open > 0.0 && self.open < self.smooth * (1.0 - 1e-9)
+    }
 }
 
 /// What a shooter of constant value 1 contributes, from its moments.

@@ -87,8 +87,9 @@ impl<const C: usize> Estimate<C> {
                     let mean = magnitudes.mean[s][c];
                     let u = f64::from(link.roughness) * magnitudes.detail[s][c];
                     let v = f64::from(link.unseen) * mean;
-                    m.square[c] += u * u + v * v;
-                    unsigned += u + v.abs();
+                    let w = f64::from(link.spread) * magnitudes.detail[s][c];
+                    m.square[c] += u * u + v * v + w * w;
+                    unsigned += u + v.abs() + w;
                     for q in 0..CHILDREN {
                         let r = f64::from(link.residual[q]) * mean;
                         m.signed[q][c] += r;
@@ -155,7 +156,7 @@ impl<const C: usize> Estimate<C> {
                 let mean = magnitudes.mean[s][c].abs();
                 receiver +=
                     link.residual[..arity].iter().map(|d| f64::from(d.abs())).sum::<f64>() / arity as f64 * mean;
-                shooter += f64::from(link.roughness) * magnitudes.detail[s][c];
+                shooter += f64::from(link.roughness + link.spread) * magnitudes.detail[s][c];
                 unseen += f64::from(link.unseen) * mean;
             }
             let share = if absolute[r] > 0.0 { (error[r] / absolute[r]).min(1.0) } else { 0.0 };

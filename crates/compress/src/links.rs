@@ -22,6 +22,8 @@ pub struct Link {
     pub strength: f32,
     /// Factor of the shooter's detail.
     pub roughness: f32,
+    /// Factor of the shooter's detail where the mask varies over the shooter.
+    pub spread: f32,
     /// Standard error of unseen mask.
     pub unseen: f32,
 }
@@ -116,6 +118,7 @@ impl Links {
                 residual: c.residual.map(|r| r as f32),
                 strength: c.strength as f32,
                 roughness: c.roughness as f32,
+                spread: c.spread as f32,
                 unseen: c.unseen as f32,
             };
             all.push((link, Some(c.block)));

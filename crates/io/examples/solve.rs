@@ -17,12 +17,22 @@ fn main() {
                 s.solution().statistics().rays
             );
         }
-        if t.elapsed().as_secs_f64() > 60.0 {
+        if t.elapsed().as_secs_f64() > 150.0 {
             println!("timeout");
             break;
         }
     }
     let sol = s.solution();
+    let t2 = Instant::now();
+    let led = ondelette_radiosity::ledger::Ledger::count(&sol, 1 << 20);
+    println!("ledger closure {:+.5} emitted {:?} in {:.2}s", led.closure(), led.emitted, t2.elapsed().as_secs_f64());
+    let t2 = Instant::now();
+    let cam = sol.scene().camera.unwrap_or_else(|| ondelette_radiosity::view::frame_from_inside(sol.scene()));
+    let img = ondelette_radiosity::view::render(&sol, &cam, 640, 480);
+    let tm = ondelette_io::write::ToneMap::auto(&img);
+    let px: Vec<[u8; 3]> = img.iter().map(|p| tm.encode(*p)).collect();
+    ondelette_io::write::write_png(std::path::Path::new("/tmp/o.png"), 640, 480, &px).unwrap();
+    println!("camera {cam:?} {:.2}s", t2.elapsed().as_secs_f64());
     println!("{:.2}s", t.elapsed().as_secs_f64());
     if let Some(r) = a.get(4) {
         // compare against the reference

@@ -240,7 +240,7 @@ impl LightKernel {
         }
         let whole = point_to_polygon(x, n, &shooter.polygon().clipped(x, n));
         if whole > 0.0 && basis.len() > 1 {
-            graded(x, n, shooter, [0.0; 2], 1.0, 0, basis, moments);
+            pieces(x, n, shooter, &mut |piece| piece.add_moments(x, n, shooter, basis, moments));
         }
         moments[0] = whole;
     }
@@ -253,58 +253,81 @@ const NEAR: f64 = 1.5;
 /// Deepest grading: pieces of 1/1024 of the source.
 const DEEPEST: u32 = 10;
 
-/// Adds the moments over one piece of the source, splitting it while the point is near.
-fn graded(
+/// A part of a source, offset + scale * local, with its form factor from a point in closed form.
+#[derive(Clone, Copy, Debug)]
+struct Piece {
+    offset: [f64; 2],
+    scale: f64,
+    exact: f64,
+}
+
+/// Splits a source towards the point x until every piece is small against its distance, and calls `each` on those that
+/// are seen, in a fixed order.
+fn pieces(x: DVec3, n: DVec3, shooter: &Element, each: &mut dyn FnMut(Piece)) {
+    descend(x, n, shooter, [0.0; 2], 1.0, 0, each);
+}
+
+fn descend(
     x: DVec3,
     n: DVec3,
     shooter: &Element,
     offset: [f64; 2],
     scale: f64,
     depth: u32,
-    basis: &CellBasis,
-    moments: &mut [f64],
+    each: &mut dyn FnMut(Piece),
 ) {
-    let piece = shooter.part(offset, scale);
-    let (centre, radius) = piece.ball();
-    let polygon = piece.polygon();
+    let element = shooter.part(offset, scale);
+    let (centre, radius) = element.ball();
     if n.dot(centre - x) < -radius {
         return;
     }
     if depth < DEEPEST && (centre - x).length() < (1.0 + NEAR) * radius {
         for c in 0..4 {
-            let (o, sign) = piece.shape.child(c);
+            let (o, sign) = element.shape.child(c);
             let child = [offset[0] + scale * o[0], offset[1] + scale * o[1]];
-            graded(x, n, shooter, child, 0.5 * sign * scale, depth + 1, basis, moments);
+            descend(x, n, shooter, child, 0.5 * sign * scale, depth + 1, each);
         }
         return;
     }
-    let exact = point_to_polygon(x, n, &polygon.clipped(x, n));
-    if exact <= 0.0 {
-        return;
+    let exact = point_to_polygon(x, n, &element.polygon().clipped(x, n));
+    if exact > 0.0 {
+        each(Piece { offset, scale, exact });
     }
-    let rule = basis.analysis(basis.order() + 1);
-    let mut values = [0.0; MOST_FUNCTIONS];
-    let mut sums = [0.0; MOST_FUNCTIONS];
-    let mut whole = 0.0;
-    // the first row of a nested basis's analysis is the quadrature rule itself
-    for (y, w) in rule.points.iter().zip(&rule.matrix) {
-        let k = w * density(x, n, piece.point(*y), shooter.normal);
-        if k > 0.0 {
-            whole += k;
-            basis.eval([offset[0] + scale * y[0], offset[1] + scale * y[1]], &mut values);
-            for j in 1..basis.len() {
-                sums[j] += k * values[j];
+}
+
+impl Piece {
+    /// The source's local coordinates of a point of the piece.
+    fn to_source(&self, y: [f64; 2]) -> [f64; 2] {
+        [self.offset[0] + self.scale * y[0], self.offset[1] + self.scale * y[1]]
+    }
+
+    /// Adds the moments 1.. of the piece: its closed form times the kernel-weighted means of the basis functions.
+    fn add_moments(&self, x: DVec3, n: DVec3, shooter: &Element, basis: &CellBasis, moments: &mut [f64]) {
+        let rule = basis.analysis(basis.order() + 1);
+        let mut values = [0.0; MOST_FUNCTIONS];
+        let mut sums = [0.0; MOST_FUNCTIONS];
+        let mut whole = 0.0;
+        // the first row of a nested basis's analysis is the quadrature rule itself
+        for (y, w) in rule.points.iter().zip(&rule.matrix) {
+            let y = self.to_source(*y);
+            let k = w * density(x, n, shooter.point(y), shooter.normal);
+            if k > 0.0 {
+                whole += k;
+                basis.eval(y, &mut values);
+                for j in 1..basis.len() {
+                    sums[j] += k * values[j];
+                }
             }
         }
-    }
-    if whole > 0.0 {
-        for j in 1..basis.len() {
-            moments[j] += exact * sums[j] / whole;
-        }
-    } else {
-        basis.eval([offset[0] + scale / 3.0, offset[1] + scale / 3.0], &mut values);
-        for j in 1..basis.len() {
-            moments[j] += exact * values[j];
+        if whole > 0.0 {
+            for j in 1..basis.len() {
+                moments[j] += self.exact * sums[j] / whole;
+            }
+        } else {
+            basis.eval(self.to_source([1.0 / 3.0; 2]), &mut values);
+            for j in 1..basis.len() {
+                moments[j] += self.exact * values[j];
+            }
         }
     }
 }
@@ -384,10 +407,7 @@ impl Pair for LightPair<'_> {
     fn mask(&self, x: [f64; 2], basis: &CellBasis, moments: &mut [f64], samples: usize, key: u64) -> f64 {
         let from = self.receiver.point(x);
         let mut seen = Seen::default();
-        self.cast(from, 0..samples.min(FIRST_RAYS), key, basis, &mut seen);
-        if seen.open > 0.0 && seen.open < seen.whole {
-            self.cast(from, samples.min(FIRST_RAYS)..samples, key, basis, &mut seen);
-        }
+        self.cast(from, samples, key, basis, &mut seen);
         let mask = if seen.whole > 0.0 { seen.open / seen.whole } else { 0.0 };
         // exact moments times the mean mask, plus the sampled covariance of mask and basis function
         let unmasked = if basis.is_nested() { moments[0] } else { moments[..basis.len()].iter().sum() };
@@ -414,9 +434,6 @@ fn sequence(key: u64, shape: CellShape, range: std::ops::Range<usize>) -> impl I
     })
 }
 
-/// Rays that decide whether a point is in the open, in full shade or between; only then are more cast.
-const FIRST_RAYS: usize = 16;
-
 /// Kernel-weighted sums over rays: of those that arrive, and of all; plain and times each basis function.
 struct Seen {
     open: f64,
@@ -432,28 +449,59 @@ impl Default for Seen {
 }
 
 impl LightPair<'_> {
-    /// Adds the given samples of a low-discrepancy sequence over the shooter.
-    fn cast(&self, x: DVec3, samples: std::ops::Range<usize>, key: u64, basis: &CellBasis, seen: &mut Seen) {
+    /// Casts about `samples` rays, shared among the pieces of the source by their form factors: where the kernel is
+    /// concentrated, near a common edge say, a plain sample of the source would miss most of what arrives.
+    fn cast(&self, x: DVec3, samples: usize, key: u64, basis: &CellBasis, seen: &mut Seen) {
+        let n = self.receiver.normal;
+        let mut parts = Vec::new();
+        pieces(x, n, &self.shooter, &mut |piece| parts.push(piece));
+        let whole: f64 = parts.iter().map(|p| p.exact).sum();
+        let mut rays = 0;
         let mut values = [0.0; MOST_FUNCTIONS];
-        self.kernel.rays.fetch_add(samples.len() as u64, Ordering::Relaxed);
-        for y in sequence(key, self.shooter.shape, samples) {
-            let point = self.shooter.point(y);
-            let weight = density(x, self.receiver.normal, point, self.shooter.normal);
-            if weight <= 0.0 {
-                continue;
-            }
-            let open = !self.kernel.occluders.blocked(x, point, self.patches);
-            basis.eval(y, &mut values);
-            seen.whole += weight;
-            if open {
-                seen.open += weight;
-            }
-            for j in 0..basis.len() {
-                seen.whole_moments[j] += weight * values[j];
-                if open {
-                    seen.open_moments[j] += weight * values[j];
+        let mut used = 0.0;
+        for (k, piece) in parts.iter().enumerate() {
+            // rounded so that the counts add up to about `samples`, at least one a piece
+            let before = (used / whole * samples as f64).round() as usize;
+            used += piece.exact;
+            let count = ((used / whole * samples as f64).round() as usize).saturating_sub(before).max(1);
+            let mut sum = Seen::default();
+            for y in sequence(seed::combine(key, k as u64), self.shooter.shape, 0..count) {
+                let y = piece.to_source(y);
+                let point = self.shooter.point(y);
+                let weight = density(x, n, point, self.shooter.normal);
+                if weight <= 0.0 {
+                    continue;
                 }
+                rays += 1;
+                let open = !self.kernel.occluders.blocked(x, point, self.patches);
+                basis.eval(y, &mut values);
+                sum.add(weight, open, &values[..basis.len()]);
             }
+            if sum.whole > 0.0 {
+                seen.merge(&sum, piece.exact / sum.whole, basis.len());
+            }
+        }
+        self.kernel.rays.fetch_add(rays, Ordering::Relaxed);
+    }
+}
+
+impl Seen {
+    fn add(&mut self, weight: f64, open: bool, values: &[f64]) {
+        let through = if open { weight } else { 0.0 };
+        self.whole += weight;
+        self.open += through;
+        for (j, v) in values.iter().enumerate() {
+            self.whole_moments[j] += weight * v;
+            self.open_moments[j] += through * v;
+        }
+    }
+
+    fn merge(&mut self, part: &Seen, factor: f64, functions: usize) {
+        self.whole += factor * part.whole;
+        self.open += factor * part.open;
+        for j in 0..functions {
+            self.whole_moments[j] += factor * part.whole_moments[j];
+            self.open_moments[j] += factor * part.open_moments[j];
         }
     }
 }

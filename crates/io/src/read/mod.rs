@@ -1,6 +1,6 @@
 //! Scene files to a valid [`Scene`]: OBJ with MTL, glTF and GLB, and the scenes that are built in.
 //!
-//! The readers turn a file into a [`SceneDraft`](ondelette_radiosity::scene::SceneDraft); what is a legal scene is
+//! The readers turn a file into a [`SceneDraft`]; what is a legal scene is
 //! decided there, once for all formats. Every error names the file, the line or the object, the value and its limit.
 
 pub mod builtin;
@@ -8,6 +8,7 @@ mod error;
 mod gltf;
 mod mtl;
 mod obj;
+mod picture;
 
 pub use error::ReadError;
 

@@ -1,6 +1,8 @@
-//! Wavefront MTL: `Kd` is the diffuse reflectance, `Ke` the emitted radiance; the rest is noted or ignored.
+//! Wavefront MTL: `Kd` (times the mean of `map_Kd`) is the diffuse reflectance, `Ke` (times the mean of `map_Ke`) the
+//! emitted radiance; transparency is noted, the rest ignored.
 
 use super::obj::{Statement, Statements};
+use super::picture::{self, UNREAD, Unread};
 use super::{ReadError, read_bytes};
 use ondelette_radiosity::Rgb;
 use ondelette_radiosity::scene::Material;
@@ -19,91 +21,107 @@ pub(super) struct Library {
     pub(super) by_name: HashMap<String, u32>,
 }
 
+/// A material while its statements are read.
+struct Entry {
+    name: String,
+    /// `Kd` and its line.
+    reflectance: Option<(Rgb, u32)>,
+    radiance: Option<Rgb>,
+    reflectance_map: Option<(Rgb, u32)>,
+    radiance_map: Option<Rgb>,
+}
+
 impl Library {
-    /// Adds the materials of one MTL file.
+    /// Adds the materials of one MTL file; a name that is there already starts over.
     ///
     /// **Errors** with file and line for numbers that are missing, not finite or out of range.
     pub(super) fn add(&mut self, path: &Path, warnings: &mut Vec<String>) -> Result<(), ReadError> {
         let bytes = read_bytes(path)?;
         let text = String::from_utf8_lossy(&bytes);
         let file = path.file_name().map_or_else(String::new, |f| f.to_string_lossy().into_owned());
-        let mut current: Option<usize> = None;
-        let mut stated = vec![true; self.materials.len()];
+        let mut entries: Vec<Entry> = Vec::new();
         for statement in Statements::new(path, &text) {
-            match statement.keyword.as_str() {
-                "newmtl" => {
-                    current = Some(self.begin(statement.rest.trim(), &file, statement.line, warnings));
-                    stated.resize(self.materials.len(), false);
+            let keyword = statement.keyword.as_str();
+            if keyword == "newmtl" {
+                let name = statement.rest.clone();
+                if self.by_name.contains_key(&name) || entries.iter().any(|e| e.name == name) {
+                    let line = statement.line;
+                    warnings.push(format!("{file}:{line}: material '{name}' is defined twice; the later one is used"));
                 }
-                "Kd" => {
-                    let index = Self::owner(current, &statement)?;
-                    self.materials[index].reflectance = reflectance(&statement, &self.materials[index].name)?;
-                    stated[index] = true;
+                entries.push(Entry {
+                    name,
+                    reflectance: None,
+                    radiance: None,
+                    reflectance_map: None,
+                    radiance_map: None,
+                });
+                continue;
+            }
+            if !["Kd", "Ke", "map_Kd", "map_Ke", "d", "Tr"].contains(&keyword) {
+                continue;
+            }
+            let Some(entry) = entries.last_mut() else {
+                return Err(statement.error(format!("{keyword} stands before the first newmtl")));
+            };
+            match keyword {
+                "Kd" => entry.reflectance = Some((colour(&statement)?, statement.line)),
+                "Ke" => entry.radiance = Some(radiance(&statement, &entry.name)?),
+                "map_Kd" => {
+                    entry.reflectance_map = Some((texture(&statement, path, &entry.name, warnings)?, statement.line));
                 }
-                "Ke" => {
-                    let index = Self::owner(current, &statement)?;
-                    let radiance = colour(&statement)?;
-                    if let Some(c) = radiance.0.iter().find(|&&c| c < 0.0) {
-                        let name = &self.materials[index].name;
-                        return Err(statement
-                            .error(format!("Ke of material '{name}' is {c}: an emitted radiance cannot be negative")));
-                    }
-                    self.materials[index].radiance = radiance;
-                }
-                "map_Kd" | "map_Ke" => {
-                    let index = Self::owner(current, &statement)?;
-                    warnings.push(format!(
-                        "{file}:{}: {} of material '{}' is not read; its {} alone is used",
-                        statement.line,
-                        statement.keyword,
-                        self.materials[index].name,
-                        &statement.keyword[4..]
-                    ));
-                }
-                "d" | "Tr" => {
-                    let index = Self::owner(current, &statement)?;
-                    let opaque = if statement.keyword == "d" { 1.0 } else { 0.0 };
+                "map_Ke" => entry.radiance_map = Some(texture(&statement, path, &entry.name, warnings)?),
+                _ => {
+                    let opaque = if keyword == "d" { 1.0 } else { 0.0 };
                     let value = statement.rest.split_whitespace().next().and_then(|w| w.parse::<f64>().ok());
                     if value.is_some_and(|v| v != opaque) {
-                        let name = &self.materials[index].name;
-                        warnings.push(format!("material '{name}' is transparent; it is treated as opaque"));
+                        warnings.push(format!("material '{}' is transparent; it is treated as opaque", entry.name));
                     }
                 }
-                _ => {}
             }
         }
-        for (material, stated) in self.materials.iter().zip(&stated) {
-            if !stated {
-                warnings.push(format!(
-                    "material '{}' of {file} states no Kd; reflectance {DEFAULT_REFLECTANCE} is assumed",
-                    material.name
-                ));
+        for entry in entries {
+            let material = entry.finish(path, &file, warnings)?;
+            match self.by_name.get(&material.name) {
+                Some(&index) => self.materials[index as usize] = material,
+                None => {
+                    let index = u32::try_from(self.materials.len()).unwrap_or(u32::MAX);
+                    self.by_name.insert(material.name.clone(), index);
+                    self.materials.push(material);
+                }
             }
         }
         Ok(())
     }
+}
 
-    /// Index of a material by name; a repeated name starts over.
-    fn begin(&mut self, name: &str, file: &str, line: u32, warnings: &mut Vec<String>) -> usize {
-        let fresh = Material {
-            name: name.to_string(),
-            reflectance: Rgb::grey(DEFAULT_REFLECTANCE),
-            radiance: Rgb::BLACK,
-            two_sided: false,
+impl Entry {
+    fn finish(self, path: &Path, file: &str, warnings: &mut Vec<String>) -> Result<Material, ReadError> {
+        let name = self.name;
+        let (reflectance, line) = match (self.reflectance, self.reflectance_map) {
+            (Some((kd, line)), map) => (kd * map.map_or(Rgb::grey(1.0), |(mean, _)| mean), line),
+            (None, Some((mean, line))) => (mean, line),
+            (None, None) => {
+                warnings.push(format!(
+                    "material '{name}' of {file} states no Kd; reflectance {DEFAULT_REFLECTANCE} is assumed"
+                ));
+                (Rgb::grey(DEFAULT_REFLECTANCE), 0)
+            }
         };
-        if let Some(&index) = self.by_name.get(name) {
-            warnings.push(format!("{file}:{line}: material '{name}' is defined twice; the later one is used"));
-            self.materials[index as usize] = fresh;
-            return index as usize;
+        if let Some(c) = reflectance.0.iter().find(|c| !(0.0..1.0).contains(*c)) {
+            let times = if self.reflectance_map.is_some() { " (times the mean of map_Kd)" } else { "" };
+            let message = format!(
+                "Kd of material '{name}'{times} is {c}, outside [0, 1): a surface cannot reflect all the light it \
+                 gets; choose a value below 1 (white paint: about 0.8)"
+            );
+            return Err(ReadError::Line { path: path.into(), line, message });
         }
-        let index = self.materials.len();
-        self.by_name.insert(name.to_string(), u32::try_from(index).unwrap_or(u32::MAX));
-        self.materials.push(fresh);
-        index
-    }
-
-    fn owner(current: Option<usize>, statement: &Statement<'_>) -> Result<usize, ReadError> {
-        current.ok_or_else(|| statement.error(format!("{} stands before the first newmtl", statement.keyword)))
+        let radiance = match (self.radiance, self.radiance_map) {
+            (Some(ke), Some(mean)) => ke * mean,
+            (Some(ke), None) => ke,
+            (None, Some(mean)) => mean,
+            (None, None) => Rgb::BLACK,
+        };
+        Ok(Material { name, reflectance, radiance, two_sided: false })
     }
 }
 
@@ -121,13 +139,42 @@ fn colour(statement: &Statement<'_>) -> Result<Rgb, ReadError> {
     }
 }
 
-fn reflectance(statement: &Statement<'_>, name: &str) -> Result<Rgb, ReadError> {
-    let reflectance = colour(statement)?;
-    if let Some(c) = reflectance.0.iter().find(|c| !(0.0..1.0).contains(*c)) {
-        return Err(statement.error(format!(
-            "Kd of material '{name}' is {c}, outside [0, 1): a surface cannot reflect all the light it gets; \
-             choose a value below 1 (white paint: about 0.8)"
-        )));
+fn radiance(statement: &Statement<'_>, name: &str) -> Result<Rgb, ReadError> {
+    let radiance = colour(statement)?;
+    match radiance.0.iter().find(|&&c| c < 0.0) {
+        None => Ok(radiance),
+        Some(c) => {
+            Err(statement.error(format!("Ke of material '{name}' is {c}: an emitted radiance cannot be negative")))
+        }
     }
-    Ok(reflectance)
+}
+
+/// Mean of a picture beside the library, in linear light. Options before the name change its place, not its mean.
+fn texture(
+    statement: &Statement<'_>,
+    path: &Path,
+    material: &str,
+    warnings: &mut Vec<String>,
+) -> Result<Rgb, ReadError> {
+    let beside = |name: &str| path.parent().unwrap_or_else(|| Path::new("")).join(name.replace('\\', "/"));
+    let mut file = beside(&statement.rest);
+    if !file.is_file() {
+        file = beside(statement.rest.split_whitespace().last().unwrap_or(""));
+    }
+    let keyword = &statement.keyword;
+    let broken = |why: String| {
+        let name = file.display();
+        statement.error(format!(
+            "{keyword} of material '{material}': {name}: {why}; put the picture there or remove this line"
+        ))
+    };
+    let bytes = std::fs::read(&file).map_err(|error| broken(error.to_string()))?;
+    match picture::mean(&bytes) {
+        Ok(mean) => Ok(Rgb(mean.linear)),
+        Err(Unread::Broken(why)) => Err(broken(why)),
+        Err(Unread::Format(why)) => {
+            warnings.push(format!("{keyword} of material '{material}': {why}; its mean is taken as {UNREAD}"));
+            Ok(Rgb::grey(UNREAD))
+        }
+    }
 }

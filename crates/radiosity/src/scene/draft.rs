@@ -163,7 +163,8 @@ impl SceneDraft {
     ///
     /// Quadrilaterals that close as a parallelogram stay one patch; pairs of triangles of one object and material that
     /// make one are merged; every other polygon becomes triangles. Faces without area and repeated faces (same
-    /// corners, same facing) are dropped, with one warning each that counts them and names the first.
+    /// corners, same facing; any facing once a two-sided face is there) are dropped, with one warning each that counts
+    /// them and names the first.
     /// A face that touches another, or lies on it, is legal.
     ///
     /// **Cost** O(n log n) in the number of corners.
@@ -325,9 +326,13 @@ impl SceneDraft {
                 flat.add(|| self.place(face));
                 continue;
             }
-            if !seen.insert(outline(&corners)) {
+            if !seen.insert(outline(corners.iter())) {
                 twice.add(|| self.place(face));
                 continue;
+            }
+            if self.materials[face.material as usize].two_sided {
+                // Its back is there already: a copy that faces the other way repeats it.
+                seen.insert(outline(corners.iter().rev()));
             }
             let at = |uv: &Vec<[f64; 2]>, i: usize| {
                 if uv.len() == face.corners.len() { Some(uv[kept[i]]) } else { None }
@@ -392,8 +397,8 @@ fn distinct_corners(corners: &[DVec3]) -> Vec<usize> {
 }
 
 /// The cyclic sequence of corners, started at its smallest: equal for faces with the same corners and facing.
-fn outline(corners: &[DVec3]) -> Vec<[u64; 3]> {
-    let mut ids: Vec<[u64; 3]> = corners.iter().map(|&c| merge::bits(c)).collect();
+fn outline<'a>(corners: impl Iterator<Item = &'a DVec3>) -> Vec<[u64; 3]> {
+    let mut ids: Vec<[u64; 3]> = corners.map(|&c| merge::bits(c)).collect();
     let start = (0..ids.len()).min_by_key(|&i| (ids[i], ids[(i + 1) % ids.len()])).unwrap_or(0);
     ids.rotate_left(start);
     ids

@@ -31,7 +31,7 @@ impl<'a> Container<'a> {
         let (mut json, mut binary) = (None, None);
         while at + 8 <= length as usize {
             let (Some(size), Some(kind)) = (word(bytes, at), bytes.get(at + 4..at + 8)) else { break };
-            let end = at + 8 + size as usize;
+            let end = (at + 8).saturating_add(size as usize);
             let Some(chunk) = bytes.get(at + 8..end) else {
                 return Err(format!("is truncated: a chunk ends at byte {end}, the file at {}", bytes.len()));
             };

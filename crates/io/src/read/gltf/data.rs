@@ -9,7 +9,7 @@ use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 /// Elements of an accessor without a buffer view (all zero) beyond this are refused.
-const MOST_ZEROS: usize = 1 << 24;
+const MOST_ZEROS: usize = 1 << 22;
 
 /// The bytes of a file and of all that it refers to.
 pub(super) struct Data<'a> {
@@ -148,7 +148,8 @@ impl<'a> Data<'a> {
         if stride < size {
             return Err(format!("elements of {size} bytes do not fit the stride of {stride} bytes"));
         }
-        let length = if count == 0 { 0 } else { (count as u64 - 1).saturating_mul(stride as u64) + size as u64 };
+        let length =
+            if count == 0 { 0 } else { (count as u64 - 1).saturating_mul(stride as u64).saturating_add(size as u64) };
         let bytes = to_range(offset, length).and_then(|r| bytes.get(r)).ok_or_else(|| {
             let have = bytes.len();
             format!("{count} elements from byte {offset} run over the end of buffer view {view} ({have} bytes)")

@@ -3,20 +3,18 @@
 //! reflectance = base colour factor * mean of its texture * mean of COLOR_0 * (1 - metallic), with metallic = its
 //! factor * the mean of its texture. Channels of 1 and more become [`CLAMPED`], with a warning.
 
+use super::super::picture::{Mean, UNREAD, Unread};
 use super::data::Data;
-use super::texture::{self, Mean, Unread};
+use super::texture;
 use ::gltf::json::material::AlphaMode;
 use ::gltf::json::validation::Checked;
 use ::gltf::json::{Index, Material as Source, Root};
 use ondelette_radiosity::Rgb;
 use ondelette_radiosity::scene::Material;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// What a reflectance of 1 or more becomes.
 pub(super) const CLAMPED: f64 = 0.95;
-
-/// Mean assumed for a picture in a format that is not read.
-const UNREAD: f64 = 0.5;
 
 /// The materials of the scene, made when first used.
 pub(super) struct Materials<'a> {
@@ -25,12 +23,21 @@ pub(super) struct Materials<'a> {
     list: Vec<Material>,
     /// By the file's material and the bits of the vertex colour.
     made: HashMap<(Option<usize>, [u64; 3]), u32>,
+    /// Materials whose warnings have been given.
+    noted: HashSet<Option<usize>>,
     textures: HashMap<usize, Mean>,
 }
 
 impl<'a> Materials<'a> {
     pub(super) fn new(root: &'a Root, data: &'a Data<'a>) -> Self {
-        Materials { root, data, list: Vec::new(), made: HashMap::new(), textures: HashMap::new() }
+        Materials {
+            root,
+            data,
+            list: Vec::new(),
+            made: HashMap::new(),
+            noted: HashSet::new(),
+            textures: HashMap::new(),
+        }
     }
 
     pub(super) fn into_list(self) -> Vec<Material> {
@@ -56,7 +63,6 @@ impl<'a> Materials<'a> {
         if let Some(&found) = self.made.get(&key) {
             return Ok(found);
         }
-        let first_use = !self.made.iter().any(|((material, _), _)| *material == key.0);
         let mut notes = Vec::new();
         let material = match index {
             None => self.convert(&Source::default(), "(no material)".into(), tint, &mut notes)?,
@@ -66,7 +72,7 @@ impl<'a> Materials<'a> {
                 self.convert(source, name, tint, &mut notes)?
             }
         };
-        if first_use {
+        if self.noted.insert(key.0) {
             warnings.append(&mut notes);
         }
         let made = u32::try_from(self.list.len()).map_err(|_| "too many materials".to_string())?;
