@@ -38,8 +38,8 @@ pub(crate) enum Command {
   ondelette light room.obj --two-sided --basis m3 --error 0.5% --max-time 2m
   ondelette light room.glb -o view.exr --camera eye=1,1.6,5:at=1,1,0:fov=50
 
-Ctrl-C stops the solver; what was asked for is written from the state reached, and the exit code is 1. A second Ctrl-C
-ends the program at once.")]
+Ctrl-C stops the solver; what was asked for is written from the state reached, and the exit code is 1. A second \
+Ctrl-C ends the program at once.")]
 pub(crate) struct LightArgs {
     /// Scene: a file ending in .obj, .gltf or .glb, or builtin:cornell
     #[arg(default_value = "builtin:cornell", value_name = "SCENE")]
@@ -86,8 +86,8 @@ pub(crate) struct LightArgs {
   ondelette probe room.onl points.csv -o values.csv
   ondelette probe room.onl points.csv --gather > values.csv
 
-The points are read from the solved surface under them, whose front faces the normal; a point farther from every such
-surface than 1e-5 of the scene's diagonal fails the run. Where surfaces meet, the one of lower number answers.")]
+The points are read from the solved surface under them, whose front faces the normal; a point farther from every \
+such surface than 1e-5 of the scene's diagonal fails the run. Where surfaces meet, the one of lower number answers.")]
 pub(crate) struct ProbeArgs {
     /// Solution file of `ondelette light -o NAME.onl`
     #[arg(value_name = "SOLUTION.onl")]

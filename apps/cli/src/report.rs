@@ -161,11 +161,10 @@ impl Record<'_> {
             writeln!(text, "error    not known yet ({wanted} % asked)")?;
         }
         if let Some(ledger) = &self.ledger {
-            let power = |p: Rgb| p.sum() * square_metre(solution);
+            let power = |p: Rgb| significant(p.sum() * square_metre(solution));
             writeln!(
                 text,
-                "ledger   {:.5} {unit} emitted (r + g + b) = {:.5} absorbed + {:.5} lost on black backs + {:.5} escaped, to \
-                 {:+.3} %",
+                "ledger   {} {unit} emitted (r + g + b) = {} absorbed + {} lost on black backs + {} escaped, to {:+.3} %",
                 power(ledger.emitted),
                 power(ledger.absorbed),
                 power(ledger.lost_on_backs),
@@ -181,6 +180,15 @@ impl Record<'_> {
     }
 }
 
+/// Five significant digits.
+fn significant(x: f64) -> String {
+    if x == 0.0 || !x.is_finite() {
+        return x.to_string();
+    }
+    let digits = 4 - x.abs().log10().floor() as i32;
+    if (0..=9).contains(&digits) { format!("{x:.*}", digits as usize) } else { format!("{x:.4e}") }
+}
+
 /// Square metres in a square unit of the scene.
 fn square_metre(solution: &Solution) -> f64 {
     let metres = solution.scene().unit.metres;
@@ -192,4 +200,15 @@ fn peak_memory() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
     line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok().map(|kib| 1024 * kib)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn powers_are_told_in_five_digits_whatever_their_size() {
+        let said = [0.0, 1.415_128, 16_000.2, 534_543.1, 0.000_123_456, 1e-12].map(significant);
+        assert_eq!(said, ["0", "1.4151", "16000", "5.3454e5", "0.00012346", "1.0000e-12"]);
+    }
 }

@@ -92,12 +92,16 @@ fn forge(chunk: &str, change: impl Fn(&mut Vec<u8>)) -> Vec<u8> {
     writer.to_bytes()
 }
 
-/// The stored links with the pairs of nodes (first eight bytes of forty) of two equal-sized neighbours exchanged.
+/// Bytes of a stored link.
+const LINK: usize = 44;
+
+/// The stored links with the pairs of nodes (the first eight bytes) of two equal-sized neighbours exchanged.
 fn swapped_records(links: &[u8]) -> Vec<u8> {
     let mut swapped = links.to_vec();
-    let same = (40..links.len()).step_by(40).find(|&k| links[k + 8..k + 10] == links[k - 32..k - 30]).unwrap();
-    swapped.copy_within(same..same + 8, same - 40);
-    swapped[same..same + 8].copy_from_slice(&links[same - 40..same - 32]);
+    let orders = |at: usize| &links[at + 8..at + 10];
+    let same = (LINK..links.len()).step_by(LINK).find(|&k| orders(k) == orders(k - LINK)).unwrap();
+    swapped.copy_within(same..same + 8, same - LINK);
+    swapped[same..same + 8].copy_from_slice(&links[same - LINK..same - LINK + 8]);
     swapped
 }
 

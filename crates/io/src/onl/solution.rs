@@ -27,6 +27,7 @@ struct LinkRecord {
     strength: f32,
     roughness: f32,
     unseen: f32,
+    spread: f32,
 }
 
 /// Writes a solution, finished or not, as the `.onl` file `path`, whole or not at all.
@@ -78,6 +79,7 @@ fn chunks(solution: &Solution) -> ChunkWriter {
             strength: l.strength,
             roughness: l.roughness,
             unseen: l.unseen,
+            spread: l.spread,
         })
         .collect();
     let mut writer = ChunkWriter::new();
@@ -181,7 +183,7 @@ fn links_of(file: &ChunkFile, forest: &Forest) -> Result<Links, OnlError> {
         if r.masked > 1 || r.zero != 0 {
             return Err(wrong("has an unknown flag"));
         }
-        let measures = r.residual.iter().chain([&r.strength, &r.roughness, &r.unseen]);
+        let measures = r.residual.iter().chain([&r.strength, &r.roughness, &r.unseen, &r.spread]);
         if measures.clone().any(|m| !m.is_finite()) {
             return Err(wrong("has an error measure that is not finite"));
         }
@@ -195,6 +197,7 @@ fn links_of(file: &ChunkFile, forest: &Forest) -> Result<Links, OnlError> {
             strength: r.strength,
             roughness: r.roughness,
             unseen: r.unseen,
+            spread: r.spread,
         });
         let mut size = 1;
         for (node, order) in [(r.receiver, r.orders[0]), (r.shooter, r.orders[1])] {
