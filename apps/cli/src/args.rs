@@ -70,12 +70,13 @@ pub(crate) struct LightArgs {
     #[arg(long)]
     pub(crate) two_sided: bool,
 
-    /// Where pictures are taken from, in the coordinates of the scene: eye=x,y,z:at=x,y,z:fov=40 (fov: vertical, degrees)
-    /// [default: the file's camera, else one that frames the scene from inside]
+    /// Where pictures are taken from, in the coordinates of the scene: eye=x,y,z:at=x,y,z:fov=40 (fov: vertical, in
+    /// degrees) [default: the file's camera, else one that frames the scene from inside]
     #[arg(long, value_name = "CAMERA", allow_hyphen_values = true)]
     pub(crate) camera: Option<String>,
 
-    /// Write the report here: seconds per stage, elements, links, rays, iterations, error, energy ledger, memory, settings
+    /// Write the report here: seconds per stage, elements, links, rays, iterations, error, energy ledger, memory,
+    /// settings
     #[arg(long, value_name = "PATH")]
     pub(crate) report: Option<PathBuf>,
 }

@@ -1,7 +1,7 @@
 //! The `ondelette` command: raw arguments ([`args`]), a validated plan ([`plan`]), the run ([`run`]).
 //!
-//! Data goes to standard output, everything else to standard error. Exit codes: 0 done, 1 a valid result that is unfinished
-//! or misses its tolerance, 2 bad input or usage.
+//! Data goes to standard output, everything else to standard error. Exit codes: 0 done, 1 a valid result that is
+//! unfinished or misses its tolerance, 2 bad input or usage.
 
 mod args;
 mod interrupt;

@@ -53,8 +53,8 @@ impl Record<'_> {
         statistics.finished && statistics.estimated_error <= self.solution.settings().error
     }
 
-    /// The report as JSON. Powers are in the unit of the scene's power, lengths in metres, times in seconds; what is not
-    /// known (an error before the first balance, the ledger of an interrupted run, memory on some systems) is null.
+    /// The report as JSON. Powers are in the unit of the scene's power, lengths in metres, times in seconds; what is
+    /// not known (an error before the first balance, the ledger of an interrupted run, memory on some systems) is null.
     pub(crate) fn json(&self) -> Value {
         let (solution, scene) = (self.solution, self.solution.scene());
         let (statistics, settings, forest) = (solution.statistics(), solution.settings(), solution.forest());
@@ -164,7 +164,7 @@ impl Record<'_> {
             let power = |p: Rgb| significant(p.sum() * square_metre(solution));
             writeln!(
                 text,
-                "ledger   {} {unit} emitted (r + g + b) = {} absorbed + {} lost on black backs + {} escaped, to {:+.3} %",
+                "ledger   {} {unit} emitted (r + g + b) = {} absorbed + {} lost on black backs + {} escaped, {:+.3} %",
                 power(ledger.emitted),
                 power(ledger.absorbed),
                 power(ledger.lost_on_backs),

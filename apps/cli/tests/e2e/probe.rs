@@ -18,8 +18,8 @@ fn rows(table: &str) -> Vec<Vec<f64>> {
     lines.map(|line| line.split(',').map(|n| n.parse().unwrap()).collect()).collect()
 }
 
-/// Form factor from a point to a parallel rectangle centred above it at height 1, with half sides a and b: four times that
-/// of a rectangle over its corner (Howell's catalogue, configuration B-3).
+/// Form factor from a point to a parallel rectangle centred above it at height 1, with half sides a and b: four times
+/// that of a rectangle over its corner (Howell's catalogue, configuration B-3).
 fn from_centre(a: f64, b: f64) -> f64 {
     let (p, q) = ((1.0 + a * a).sqrt(), (1.0 + b * b).sqrt());
     4.0 / (2.0 * PI) * (a / p * (b / p).atan() + b / q * (a / q).atan())

@@ -13,7 +13,8 @@
 //!
 //! Integers and floats are little-endian. There is one layout for given chunks, so equal solutions are equal files, and
 //! every byte is covered by a checksum or known to be zero. Nothing but the caller's chunks enters: no clock, thread
-//! count or path. [`write_solution`] and [`read_solution`] put a solution into chunks; `docs/formats/onl.md` lists them.
+//! count or path. [`write_solution`] and [`read_solution`] know what the chunks of a solution
+//! mean; `docs/formats/onl.md` lists them.
 
 mod error;
 mod read;

@@ -110,8 +110,8 @@ impl CsvWriter {
     }
 }
 
-/// Appends a row of numbers to `text` as [`CsvWriter::row`] writes it, and `gaps` empty cells: for tables whose rows are
-/// printed in parallel and for standard output. The numbers are taken as they are.
+/// Appends a row of numbers to `text` as [`CsvWriter::row`] writes it, and `gaps` empty cells: for tables whose rows
+/// are printed in parallel and for standard output. The numbers are taken as they are.
 ///
 /// ```
 /// let mut text = String::new();

@@ -14,9 +14,9 @@ const TONE_SAMPLES: f64 = 20_000.0;
 /// The model that shows a solution: one mesh an object, one flat colour a box where the basis is piecewise constant,
 /// else colours at the corners of 2 x 2 (order 2) or 4 x 4 quads (higher orders) an element.
 ///
-/// Colours are the radiance B / pi that leaves, seen through `tone`; positions are in metres. Each side has triangles of
-/// its own, which viewers draw from its front only: the two sides of a patch do not fight for pixels, and one looks into
-/// a closed room from outside. Cost O(leaves).
+/// Colours are the radiance B / pi that leaves, seen through `tone`; positions are in metres. Each side has triangles
+/// of its own, which viewers draw from its front only: the two sides of a patch do not fight for pixels, and one looks
+/// into a closed room from outside. Cost O(leaves).
 ///
 /// ```
 /// use ondelette_io::write::{glb_bytes, lit_model, scene_tone};

@@ -54,7 +54,8 @@ pub fn elements_path(path: &Path) -> PathBuf {
 /// Writes the links as the table `path` and the leaf elements as the table [`elements_path`]`(path)`.
 ///
 /// Links, one a row: nodes, sides, objects and levels at both ends, orders, `strength` (the part of a unit radiosity of
-/// the shooter that arrives, as mean irradiance), `visibility` (`full` or `sampled`), the largest residual of its tests.
+/// the shooter that arrives, as mean irradiance), `visibility` (`full` or `sampled`), the largest residual of its
+/// tests.
 /// Elements, one a row: node, side, object, level, area in scene units squared, centre, mean irradiance and radiosity.
 ///
 /// # Errors
