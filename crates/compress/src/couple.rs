@@ -80,6 +80,8 @@ pub fn couple<K: Kernel>(
             mask_samples = settings.samples;
             seen = MaskSums::take(&pair, &places, shooter_basis, &mut moments, mask_samples, key);
         }
+        let correction = seen.correction();
+        moments.iter_mut().for_each(|m| *m *= correction);
     }
 
     let mut block = vec![0.0; nr * ns];
@@ -144,6 +146,9 @@ struct MaskSums {
     smooth: f64,
     /// Of the mask's standard deviation over the shooter.
     spread: f64,
+    /// Of what arrives at present, and of what would arrive from the shooter's projection.
+    actual: f64,
+    projected: f64,
     /// Number of points that would receive anything.
     points: f64,
 }
@@ -162,13 +167,20 @@ impl MaskSums {
             let whole = total(basis, row);
             if whole > 0.0 {
                 let mask = pair.mask(*x, basis, row, samples, seed::combine(key, q as u64));
-                sums.open += mask * whole;
+                sums.open += mask.mean * whole;
                 sums.smooth += whole;
-                sums.spread += whole * (mask * (1.0 - mask)).max(0.0).sqrt();
+                sums.spread += whole * (mask.mean * (1.0 - mask.mean)).max(0.0).sqrt();
+                sums.actual += mask.actual;
+                sums.projected += mask.projected;
                 sums.points += 1.0;
             }
         }
         sums
+    }
+
+    /// How much more (or less) arrives than the shooter's projection says; 1 where nothing is known.
+    fn correction(&self) -> f64 {
+        if self.actual > 0.0 && self.projected > 0.0 { (self.actual / self.projected).clamp(0.5, 2.0) } else { 1.0 }
     }
 
     fn is_mixed(&self) -> bool {

@@ -36,11 +36,22 @@ pub trait Pair {
         false
     }
 
-    /// Turns the moments seen from x into masked moments, by at most `samples` samples of the mask drawn from `key`;
-    /// returns the mask's mean over the shooter, weighted with the kernel.
-    fn mask(&self, _x: [f64; 2], _basis: &CellBasis, _moments: &mut [f64], _samples: usize, _key: u64) -> f64 {
-        1.0
+    /// Turns the moments seen from x into masked moments, by about `samples` samples of the mask drawn from `key`.
+    fn mask(&self, _x: [f64; 2], _basis: &CellBasis, _moments: &mut [f64], _samples: usize, _key: u64) -> Masked {
+        Masked { mean: 1.0, actual: 0.0, projected: 0.0 }
     }
+}
+
+/// What mask samples at one receiver point found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Masked {
+    /// Mean of the mask over the shooter, weighted with the kernel.
+    pub mean: f64,
+    /// Masked kernel times what the shooter shoots at present, where the kernel knows it; else 0.
+    pub actual: f64,
+    /// The same with the shooter's projection on its own cell's basis. The ratio of both corrects the block for detail
+    /// that goes with the mask: what is hidden from here is often what is dark.
+    pub projected: f64,
 }
 
 /// A kernel given by a plain function of root coordinates and roots, integrated by Gauss rules: for tests, and for

@@ -24,6 +24,6 @@ pub use cell::Cell;
 pub use couple::{CoupleSettings, Coupling, couple};
 pub use estimate::{Estimate, Magnitudes};
 pub use forest::{Forest, NodeId};
-pub use kernel::{Kernel, Pair};
+pub use kernel::{Kernel, Masked, Pair};
 pub use links::{Link, Links};
 pub use refine::{End, Refinement, Task};

@@ -73,6 +73,15 @@ impl Refinement {
         Refinement { tasks, done: Vec::new(), removed: chosen.iter().map(|c| c.0).collect() }
     }
 
+    /// A batch that couples the chosen links (by index) anew, as they are.
+    pub fn renewing(links: &Links, chosen: &[u32], settings: impl Fn(u32) -> CoupleSettings) -> Self {
+        let task = |&k: &u32| {
+            let link = links.as_slice()[k as usize];
+            Task::between(link.receiver, link.shooter, settings(k))
+        };
+        Refinement { tasks: chosen.iter().map(task).collect(), done: Vec::new(), removed: chosen.to_vec() }
+    }
+
     /// Number of tasks.
     pub fn len(&self) -> usize {
         self.tasks.len()

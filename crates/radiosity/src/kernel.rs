@@ -9,7 +9,7 @@ use crate::form_factor::{Polygon, point_to_polygon};
 use crate::occluder::{Occluders, Shaft};
 use crate::scene::{Scene, Shape};
 use glam::DVec3;
-use ondelette_compress::{Cell, Kernel, Pair};
+use ondelette_compress::{Cell, Forest, Kernel, Masked, NodeId, Pair};
 use ondelette_numerics::seed;
 use ondelette_wavelet::cell::{CellBasis, CellShape};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -40,6 +40,49 @@ pub struct LightKernel {
     /// Front and back side of each patch.
     of_patch: Vec<[Option<u32>; 2]>,
     rays: AtomicU64,
+    /// The radiosity of the last solve.
+    present: Option<Present>,
+}
+
+/// Radiosity as last solved (channels summed), by which masks are weighted.
+struct Present {
+    forest: Forest,
+    /// Coefficients of all nodes, pulled.
+    values: Vec<[f64; 1]>,
+}
+
+impl Present {
+    /// Radiosity at root coordinates.
+    fn at(&self, root: u32, x: [f64; 2]) -> f64 {
+        let (leaf, local) = self.forest.locate(root as usize, x);
+        self.value(leaf, local)
+    }
+
+    fn value(&self, id: NodeId, local: [f64; 2]) -> f64 {
+        let basis = self.forest.basis_of(id);
+        let mut values = [0.0; MOST_FUNCTIONS];
+        basis.eval(local, &mut values);
+        let own = &self.values[id.index() * self.forest.stride()..][..basis.len()];
+        own.iter().zip(&values).map(|(c, v)| c[0] * v).sum()
+    }
+
+    /// The node of a cell, if it has detail below it.
+    fn inner_node(&self, cell: &Cell) -> Option<NodeId> {
+        let centre = cell.to_root(match cell.shape {
+            CellShape::Triangle => [1.0 / 3.0; 2],
+            _ => [0.5; 2],
+        });
+        let mut id = self.forest.roots()[cell.root as usize];
+        let mut x = centre;
+        while self.forest.node(id).cell.depth < cell.depth {
+            if self.forest.is_leaf(id) {
+                return None;
+            }
+            let (c, local) = cell.shape.descend(x);
+            (id, x) = (self.forest.child(id, c), local);
+        }
+        (!self.forest.is_leaf(id)).then_some(id)
+    }
 }
 
 impl SideFrame {
@@ -157,7 +200,7 @@ impl LightKernel {
         for (i, side) in scene.sides.iter().enumerate() {
             of_patch[side.patch as usize][usize::from(side.back)] = Some(i as u32);
         }
-        LightKernel { sides, occluders: Occluders::new(scene), of_patch, rays: AtomicU64::new(0) }
+        LightKernel { sides, occluders: Occluders::new(scene), of_patch, rays: AtomicU64::new(0), present: None }
     }
 
     /// The sides, in scene order.
@@ -168,6 +211,11 @@ impl LightKernel {
     /// What blocks light.
     pub fn occluders(&self) -> &Occluders {
         &self.occluders
+    }
+
+    /// Tells the kernel what the sides shoot at present: coefficients of all nodes of `forest`, pulled, channels summed.
+    pub fn set_present(&mut self, forest: Forest, values: Vec<[f64; 1]>) {
+        self.present = Some(Present { forest, values });
     }
 
     /// The front or back side of a patch, if it has one.
@@ -365,7 +413,9 @@ impl Kernel for LightKernel {
         if candidates.iter().any(|&p| self.occluders.hides(p, a.corners(), b.corners())) {
             return None;
         }
-        Some(LightPair { kernel: self, receiver: r, shooter: s, patches, masked: !candidates.is_empty() })
+        let masked = !candidates.is_empty();
+        let node = if masked { self.present.as_ref().and_then(|p| p.inner_node(shooter)) } else { None };
+        Some(LightPair { kernel: self, receiver: r, shooter: s, cell: *shooter, node, patches, masked })
     }
 }
 
@@ -374,6 +424,9 @@ pub struct LightPair<'a> {
     kernel: &'a LightKernel,
     receiver: Element,
     shooter: Element,
+    /// The shooter's cell, and its node in the present solution if that has detail below it.
+    cell: Cell,
+    node: Option<NodeId>,
     patches: [u32; 2],
     masked: bool,
 }
@@ -404,7 +457,7 @@ impl Pair for LightPair<'_> {
         self.masked
     }
 
-    fn mask(&self, x: [f64; 2], basis: &CellBasis, moments: &mut [f64], samples: usize, key: u64) -> f64 {
+    fn mask(&self, x: [f64; 2], basis: &CellBasis, moments: &mut [f64], samples: usize, key: u64) -> Masked {
         let from = self.receiver.point(x);
         let mut seen = Seen::default();
         self.cast(from, samples, key, basis, &mut seen);
@@ -417,7 +470,8 @@ impl Pair for LightPair<'_> {
                 *m += unmasked * (seen.open_moments[j] - mask * seen.whole_moments[j]) / seen.whole;
             }
         }
-        mask
+        let scale = if seen.whole > 0.0 { unmasked / seen.whole } else { 0.0 };
+        Masked { mean: mask, actual: scale * seen.actual, projected: scale * seen.projected }
     }
 }
 
@@ -440,11 +494,21 @@ struct Seen {
     whole: f64,
     open_moments: [f64; MOST_FUNCTIONS],
     whole_moments: [f64; MOST_FUNCTIONS],
+    /// Of what arrives, times the present radiosity, and times its projection.
+    actual: f64,
+    projected: f64,
 }
 
 impl Default for Seen {
     fn default() -> Self {
-        Seen { open: 0.0, whole: 0.0, open_moments: [0.0; MOST_FUNCTIONS], whole_moments: [0.0; MOST_FUNCTIONS] }
+        Seen {
+            open: 0.0,
+            whole: 0.0,
+            open_moments: [0.0; MOST_FUNCTIONS],
+            whole_moments: [0.0; MOST_FUNCTIONS],
+            actual: 0.0,
+            projected: 0.0,
+        }
     }
 }
 
@@ -476,6 +540,10 @@ impl LightPair<'_> {
                 let open = !self.kernel.occluders.blocked(x, point, self.patches);
                 basis.eval(y, &mut values);
                 sum.add(weight, open, &values[..basis.len()]);
+                if open && let (Some(node), Some(present)) = (self.node, &self.kernel.present) {
+                    sum.actual += weight * present.at(self.cell.root, self.cell.to_root(y));
+                    sum.projected += weight * present.value(node, y);
+                }
             }
             if sum.whole > 0.0 {
                 seen.merge(&sum, piece.exact / sum.whole, basis.len());
@@ -499,6 +567,8 @@ impl Seen {
     fn merge(&mut self, part: &Seen, factor: f64, functions: usize) {
         self.whole += factor * part.whole;
         self.open += factor * part.open;
+        self.actual += factor * part.actual;
+        self.projected += factor * part.projected;
         for j in 0..functions {
             self.whole_moments[j] += factor * part.whole_moments[j];
             self.open_moments[j] += factor * part.open_moments[j];

@@ -79,6 +79,8 @@ enum Phase {
     Linking(Refinement),
     Solving(Box<Gmres<3>>),
     Refining(Refinement),
+    /// Coupling masked links anew with the radiosity that is known at last.
+    Renewing(Refinement),
     Finished,
 }
 
@@ -103,6 +105,10 @@ pub struct Solver {
     phase: Phase,
     /// Whether the present solve goes to the final tolerance.
     strict: bool,
+    /// Whether nothing is left to refine although the promise is not kept.
+    stalled: bool,
+    /// Whether the masked links were coupled anew since the last refinement.
+    renewed: bool,
     error: f64,
     statistics: Statistics,
 }
@@ -158,6 +164,8 @@ impl Solver {
             irradiance,
             phase: Phase::Linking(Refinement::linking(tasks)),
             strict: false,
+            stalled: false,
+            renewed: false,
             error: f64::INFINITY,
             statistics: Statistics::default(),
         })
@@ -177,6 +185,9 @@ impl Solver {
             Phase::Refining(batch) => {
                 Some(self.work(batch, |done, total| Event::Refining { done, total }, Phase::Refining))
             }
+            Phase::Renewing(batch) => {
+                Some(self.work(batch, |done, total| Event::Refining { done, total }, Phase::Renewing))
+            }
             Phase::Solving(gmres) => Some(self.sweep(gmres)),
             Phase::Finished => None,
         }
@@ -186,7 +197,7 @@ impl Solver {
     pub fn solution(&self) -> Solution {
         let mut statistics = self.statistics.clone();
         statistics.estimated_error = self.error;
-        statistics.finished = matches!(self.phase, Phase::Finished);
+        statistics.finished = matches!(self.phase, Phase::Finished) && !self.stalled;
         Solution::new(
             self.scene.clone(),
             self.settings,
@@ -341,7 +352,27 @@ impl Solver {
             0.0
         };
         let event = Event::Solved { error: self.error, links: self.links.len(), elements: self.forest.leaves() };
-        if self.error <= self.settings.error {
+        self.know_present(&values);
+        let unit = mean.sum();
+        let settings = |k: u32| {
+            let link = self.links.as_slice()[k as usize];
+            let shot: f64 = magnitudes.mean[link.shooter.index()].iter().sum();
+            let share = f64::from(link.strength) * shot / unit;
+            let samples = (share / self.settings.error).powf(4.0 / 3.0).clamp(4.0, MOST_RAYS as f64) as usize;
+            let negligible = if shot > 0.0 { 0.003 * self.settings.error * unit / shot } else { 0.0 };
+            CoupleSettings { negligible, samples }
+        };
+        // the first time good enough: renew; then tighten; then done, even where renewing moved the estimate a little
+        let slack = if self.renewed { 1.02 } else { 1.0 };
+        if self.error <= slack * self.settings.error {
+            if !self.renewed {
+                self.renewed = true;
+                let chosen = self.worth_renewing(&magnitudes);
+                if !chosen.is_empty() {
+                    self.phase = Phase::Renewing(Refinement::renewing(&self.links, &chosen, settings));
+                    return event;
+                }
+            }
             if self.strict {
                 self.phase = Phase::Finished;
             } else {
@@ -351,6 +382,7 @@ impl Solver {
             return event;
         }
         self.strict = false;
+        self.renewed = false;
         let target = self.settings.error * whole;
         let wanted = (estimate.total - 0.5 * target).min(0.6 * estimate.total).max(0.2 * estimate.total);
         let chosen: Vec<(u32, End)> = estimate
@@ -364,22 +396,44 @@ impl Solver {
             })
             .collect();
         if chosen.is_empty() {
-            self.strict = true;
+            self.stalled = true;
             self.phase = Phase::Finished;
             return event;
         }
-        let unit = mean.sum();
-        let settings = |k: u32| {
-            let link = self.links.as_slice()[k as usize];
-            let shot: f64 = magnitudes.mean[link.shooter.index()].iter().sum();
-            let share = f64::from(link.strength) * shot / unit;
-            let samples = (share / self.settings.error).powf(4.0 / 3.0).clamp(4.0, MOST_RAYS as f64) as usize;
-            let negligible = if shot > 0.0 { 0.003 * self.settings.error * unit / shot } else { 0.0 };
-            CoupleSettings { negligible, samples }
-        };
         let batch = Refinement::splitting(&self.forest, &self.links, &chosen, settings);
         self.phase = Phase::Refining(batch);
         event
+    }
+
+    /// Gives the kernel the radiosity as it stands.
+    fn know_present(&mut self, pulled: &[[f64; 3]]) {
+        let values = pulled.iter().map(|v| [v[0] + v[1] + v[2]]).collect();
+        self.kernel.set_present(self.forest.clone(), values);
+    }
+
+    /// The masked links whose shooters have detail: those that make up nearly all of what detail and mask do together.
+    fn worth_renewing(&self, magnitudes: &Magnitudes<3>) -> Vec<u32> {
+        let stakes: Vec<f64> = self
+            .links
+            .as_slice()
+            .iter()
+            .map(|l| {
+                let detail: f64 = magnitudes.detail[l.shooter.index()].iter().sum();
+                self.forest.node(l.receiver).measure * f64::from(l.spread) * detail
+            })
+            .collect();
+        let whole: f64 = stakes.iter().sum();
+        let mut order: Vec<u32> = (0..stakes.len() as u32).filter(|&k| stakes[k as usize] > 0.0).collect();
+        order.sort_by(|&a, &b| stakes[b as usize].total_cmp(&stakes[a as usize]).then(a.cmp(&b)));
+        let mut sum = 0.0;
+        let enough = order.iter().take_while(|&&k| {
+            let before = sum;
+            sum += stakes[k as usize];
+            before < 0.98 * whole
+        });
+        let mut chosen: Vec<u32> = enough.copied().collect();
+        chosen.sort_unstable();
+        chosen
     }
 
     /// Area-weighted mean irradiance over the sides that the promise counts, and their area.
