@@ -1,7 +1,7 @@
 //! Scene, picture, model and solution files.
 //!
-//! [`read_scene`]: scene files and the built-in scenes; [`mod@write`]: pictures, lit models and tables, each written whole
-//! or not at all; [`onl`]: the versioned, checksummed container of solutions. Engines know no file format: everything that
+//! [`read_scene`]: scene files and the built-in scenes; [`mod@write`]: pictures, lit models and tables, each written
+//! whole or not at all; [`onl`]: solutions, versioned and checksummed. Engines know no file format: everything that
 //! parses or prints bytes for a user's disk is here.
 
 pub mod onl;

@@ -67,6 +67,15 @@ impl CellShape {
         (c, [2.0 * sign * (x[0] - o[0]), 2.0 * sign * (x[1] - o[1])])
     }
 
+    /// The centre of mass.
+    pub fn centre(self) -> [f64; 2] {
+        match self {
+            CellShape::Interval => [0.5, 0.0],
+            CellShape::Square => [0.5; 2],
+            CellShape::Triangle => [1.0 / 3.0; 2],
+        }
+    }
+
     /// Gauss rule with `n` points an axis; weights sum to 1.
     pub fn rule(self, n: usize) -> (Vec<[f64; 2]>, Vec<f64>) {
         match self {

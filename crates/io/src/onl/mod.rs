@@ -13,15 +13,17 @@
 //!
 //! Integers and floats are little-endian. There is one layout for given chunks, so equal solutions are equal files, and
 //! every byte is covered by a checksum or known to be zero. Nothing but the caller's chunks enters: no clock, thread
-//! count or path. What the chunks mean is the business of the code that reads and writes them; `docs/formats/onl.md`
-//! lists them.
+//! count or path. [`write_solution`] and [`read_solution`] know what the chunks of a solution
+//! mean; `docs/formats/onl.md` lists them.
 
 mod error;
 mod read;
+mod solution;
 mod write;
 
 pub use error::OnlError;
 pub use read::ChunkFile;
+pub use solution::{read_solution, solution_bytes, solution_of, write_solution};
 pub use write::ChunkWriter;
 
 /// Version of the format that this program writes and reads.

@@ -34,6 +34,9 @@ pub struct AtomicFile {
     file: Option<BufWriter<File>>,
 }
 
+/// Ending of a file under construction.
+const PART: &str = ".part";
+
 /// Tells apart the files that one process has under construction in the same folder.
 static SERIAL: AtomicU32 = AtomicU32::new(0);
 
@@ -64,7 +67,7 @@ impl AtomicFile {
             let serial = SERIAL.fetch_add(1, Ordering::Relaxed);
             let mut hidden = std::ffi::OsString::from(".");
             hidden.push(name);
-            hidden.push(format!(".{}-{serial}.part", std::process::id()));
+            hidden.push(format!(".{}-{serial}{PART}", std::process::id()));
             let beside = folder.join(hidden);
             match OpenOptions::new().write(true).create_new(true).open(&beside) {
                 Ok(file) => {
@@ -155,6 +158,22 @@ pub fn check_writable(path: &Path) -> Result<(), WriteError> {
     AtomicFile::create(path).map(drop)
 }
 
+/// Removes what this process has under construction in `folder`: for a program that ends at once, without dropping its
+/// [`AtomicFile`]s. Best effort, no errors: there is nobody left to tell.
+pub fn remove_unfinished(folder: &Path) {
+    let folder = if folder == Path::new("") { Path::new(".") } else { folder };
+    let own = format!(".{}-", std::process::id());
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        let serial = name.strip_suffix(PART).and_then(|stem| stem.rsplit_once(&own)).map(|(_, serial)| serial);
+        if name.starts_with('.') && serial.is_some_and(|s| !s.is_empty() && s.bytes().all(|b| b.is_ascii_digit())) {
+            // gone or refused: either way there is nothing more to do
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+}
+
 /// Makes `folder` and the folders above it. For the program's own default folder only: a folder that a user typed and
 /// that is not there is more likely a slip, which [`check_writable`] reports.
 ///
@@ -200,6 +219,21 @@ mod tests {
         drop(file);
         assert_eq!(fs::read(&path).unwrap(), b"old");
         assert_eq!(names(folder.path()), ["room.png"]);
+    }
+
+    #[test]
+    fn a_process_that_ends_at_once_can_clear_up_and_spares_all_other_files() {
+        let folder = tempfile::tempdir().unwrap();
+        for other in [".room.png.1-0.part", "room.part", ".part", "note.txt"] {
+            write_bytes(&folder.path().join(other), b"keep").unwrap();
+        }
+        let before = names(folder.path());
+        let file = AtomicFile::create(&folder.path().join("room.png")).unwrap();
+        assert_eq!(names(folder.path()).len(), before.len() + 1);
+        remove_unfinished(folder.path());
+        assert_eq!(names(folder.path()), before);
+        drop(file);
+        remove_unfinished(&folder.path().join("missing"));
     }
 
     #[test]

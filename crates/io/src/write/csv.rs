@@ -83,7 +83,7 @@ impl CsvWriter {
                 self.line.push(',');
             }
             match cell {
-                Cell::Number(value) if value.is_finite() => self.line.push_str(&shortest(value)),
+                Cell::Number(value) if value.is_finite() => push_shortest(&mut self.line, value),
                 Cell::Number(value) => {
                     let reason = format!("row {}, column {}: the value is {value}", self.rows + 1, i + 1);
                     return Err(WriteError::data(&self.path, reason));
@@ -110,10 +110,32 @@ impl CsvWriter {
     }
 }
 
-/// The shortest decimal that reads back as the same number.
-fn shortest(value: f64) -> String {
+/// Appends a row of numbers to `text` as [`CsvWriter::row`] writes it, and `gaps` empty cells: for tables whose rows
+/// are printed in parallel and for standard output. The numbers are taken as they are.
+///
+/// ```
+/// let mut text = String::new();
+/// ondelette_io::write::push_row(&mut text, &[0.25, 1e-9], 1);
+/// assert_eq!(text, "0.25,1e-9,\n");
+/// ```
+pub fn push_row(text: &mut String, values: &[f64], gaps: usize) {
+    for (i, value) in values.iter().enumerate() {
+        if i > 0 {
+            text.push(',');
+        }
+        push_shortest(text, *value);
+    }
+    text.extend(std::iter::repeat_n(',', gaps));
+    text.push('\n');
+}
+
+/// Appends the shortest decimal that reads back as the same number.
+fn push_shortest(text: &mut String, value: f64) {
+    use std::fmt::Write;
     let size = value.abs();
-    if value == 0.0 || (1e-5..1e16).contains(&size) { format!("{value}") } else { format!("{value:e}") }
+    // Writing to a String does not fail.
+    let _ =
+        if value == 0.0 || (1e-5..1e16).contains(&size) { write!(text, "{value}") } else { write!(text, "{value:e}") };
 }
 
 /// A header cell, in quotes where RFC 4180 wants them.
@@ -131,7 +153,8 @@ mod tests {
         fn numbers_read_back_to_the_bit(bits in any::<u64>()) {
             let value = f64::from_bits(bits);
             if value.is_finite() {
-                let text = shortest(value);
+                let mut text = String::new();
+                push_shortest(&mut text, value);
                 prop_assert_eq!(text.parse::<f64>().unwrap().to_bits(), bits);
                 prop_assert!(text.len() <= 24, "{} is not short", text);
             }

@@ -6,13 +6,17 @@
 mod atomic;
 mod csv;
 mod glb;
+mod lit;
 mod picture;
+mod tables;
 mod tone;
 
-pub use atomic::{AtomicFile, check_writable, create_folder, write_bytes};
-pub use csv::{Cell, CsvWriter};
+pub use atomic::{AtomicFile, check_writable, create_folder, remove_unfinished, write_bytes};
+pub use csv::{Cell, CsvWriter, push_row};
 pub use glb::{LitMesh, LitModel, ModelNote, glb_bytes, write_glb};
+pub use lit::{lit_model, scene_tone};
 pub use picture::{exr_bytes, png_bytes, write_exr, write_png};
+pub use tables::{elements_path, write_tables};
 pub use tone::ToneMap;
 
 use std::io;

@@ -9,6 +9,7 @@
 //!   emits at its front, and its back is opaque black for every ray but those of the camera;
 //! * a two-sided material makes two [`Side`]s of one patch: two receivers and two emitters that share one geometry.
 
+mod check;
 mod describe;
 mod draft;
 mod emitter;
@@ -39,6 +40,22 @@ impl Quantity {
         match self {
             Quantity::Radiometric => "W/m^2",
             Quantity::Photometric => "lx",
+        }
+    }
+
+    /// What radiance is called.
+    pub fn radiance_name(self) -> &'static str {
+        match self {
+            Quantity::Radiometric => "radiance",
+            Quantity::Photometric => "luminance",
+        }
+    }
+
+    /// What irradiance is called.
+    pub fn irradiance_name(self) -> &'static str {
+        match self {
+            Quantity::Radiometric => "irradiance",
+            Quantity::Photometric => "illuminance",
         }
     }
 

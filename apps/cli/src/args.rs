@@ -1,0 +1,118 @@
+//! What the user typed, not yet judged.
+
+use clap::{Parser, Subcommand};
+use std::path::PathBuf;
+
+#[derive(Debug, Parser)]
+#[command(
+    name = "ondelette",
+    version,
+    about = "Lights rooms: the interreflection of light between matt surfaces, in wavelets, to an accuracy in per cent",
+    after_help = "Examples:
+  ondelette light                                  the built-in Cornell box, into out/
+  ondelette info room.glb                          what is in a scene
+  ondelette light room.glb --error 1%              out/room.png, out/room.glb, out/room.json
+  ondelette probe room.onl points.csv -o out.csv   irradiance and radiosity at points
+
+Exit codes: 0 done; 1 a valid result that is unfinished or misses its tolerance; 2 bad input or usage."
+)]
+pub(crate) struct Args {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Light a scene
+    Light(LightArgs),
+    /// Irradiance and radiosity at points of a solved scene
+    Probe(ProbeArgs),
+    /// What is in a scene file
+    Info(InfoArgs),
+}
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  ondelette light
+  ondelette light room.glb -o room.png -o room.glb -o room.onl --report room.json
+  ondelette light room.obj --two-sided --basis m3 --error 0.5% --max-time 2m
+  ondelette light room.glb -o view.exr --camera eye=1,1.6,5:at=1,1,0:fov=50
+
+Ctrl-C stops the solver; what was asked for is written from the state reached, and the exit code is 1. A second \
+Ctrl-C ends the program at once.")]
+pub(crate) struct LightArgs {
+    /// Scene: a file ending in .obj, .gltf or .glb, or builtin:cornell
+    #[arg(default_value = "builtin:cornell", value_name = "SCENE")]
+    pub(crate) scene: PathBuf,
+
+    /// What to write; may be repeated. The ending says what: .glb lit model, .png or .exr picture, .csv links (and
+    /// NAME.elements.csv elements), .onl solution [default: out/NAME.png, out/NAME.glb and the report out/NAME.json]
+    #[arg(short = 'o', long = "output", value_name = "PATH")]
+    pub(crate) outputs: Vec<PathBuf>,
+
+    /// Functions that light is represented in: haar, m1 to m6 (multiwavelets), f1 to f4 (flatlets)
+    #[arg(long, default_value = "m2", value_name = "NAME", allow_hyphen_values = true)]
+    pub(crate) basis: String,
+
+    /// Mean absolute error of the irradiance that is allowed, in per cent of its mean: 1%, 0.5, 3%
+    #[arg(long, default_value = "1%", value_name = "PERCENT", allow_hyphen_values = true)]
+    pub(crate) error: String,
+
+    /// Stop solving after this time: 10s, 2m, 500ms. The state reached is written, and the exit code is 1
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
+    pub(crate) max_time: Option<String>,
+
+    /// Number of threads; the result does not depend on it [default: one a processor]
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    pub(crate) threads: Option<String>,
+
+    /// Let both sides of every surface of an OBJ file reflect and emit (glTF files say so a material: doubleSided)
+    #[arg(long)]
+    pub(crate) two_sided: bool,
+
+    /// Where pictures are taken from, in the coordinates of the scene: eye=x,y,z:at=x,y,z:fov=40 (fov: vertical, in
+    /// degrees) [default: the file's camera, else one that frames the scene from inside]
+    #[arg(long, value_name = "CAMERA", allow_hyphen_values = true)]
+    pub(crate) camera: Option<String>,
+
+    /// Write the report here: seconds per stage, elements, links, rays, iterations, error, energy ledger, memory,
+    /// settings
+    #[arg(long, value_name = "PATH")]
+    pub(crate) report: Option<PathBuf>,
+}
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  ondelette light room.glb -o room.onl
+  ondelette probe room.onl points.csv -o values.csv
+  ondelette probe room.onl points.csv --gather > values.csv
+
+The points are read from the solved surface under them, whose front faces the normal; a point farther from every \
+such surface than 1e-5 of the scene's diagonal fails the run. Where surfaces meet, the one of lower number answers.")]
+pub(crate) struct ProbeArgs {
+    /// Solution file of `ondelette light -o NAME.onl`
+    #[arg(value_name = "SOLUTION.onl")]
+    pub(crate) solution: PathBuf,
+
+    /// Points: x,y,z,nx,ny,nz a line, in the coordinates of the scene; a header line is optional
+    #[arg(value_name = "POINTS.csv")]
+    pub(crate) points: PathBuf,
+
+    /// Table to write, a row a point in order [default: standard output]
+    #[arg(short = 'o', long = "output", value_name = "OUT.csv")]
+    pub(crate) output: Option<PathBuf>,
+
+    /// Irradiance at free points and normals, gathered from the solved scene; the radiosity columns stay empty
+    #[arg(long)]
+    pub(crate) gather: bool,
+}
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  ondelette info room.glb
+  ondelette info builtin:cornell")]
+pub(crate) struct InfoArgs {
+    /// Scene: a file ending in .obj, .gltf or .glb, or builtin:cornell
+    #[arg(value_name = "SCENE")]
+    pub(crate) scene: PathBuf,
+}

@@ -1,0 +1,163 @@
+//! The plan of `ondelette light`.
+
+use super::check_distinct;
+use super::values::{self, CameraRequest};
+use crate::args::LightArgs;
+use crate::run::Refusal;
+use ondelette_io::write::{check_writable, elements_path};
+use ondelette_radiosity::Settings;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// What an ending asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Kind {
+    /// `.onl`: the solution.
+    Solution,
+    /// `.csv`: links and elements.
+    Tables,
+    /// `.glb`: the lit model.
+    Model,
+    /// `.png`: the picture, tone mapped.
+    Picture,
+    /// `.exr`: the picture, linear.
+    LinearPicture,
+}
+
+/// Known endings.
+const ENDINGS: [(&str, Kind); 5] = [
+    ("glb", Kind::Model),
+    ("png", Kind::Picture),
+    ("exr", Kind::LinearPicture),
+    ("csv", Kind::Tables),
+    ("onl", Kind::Solution),
+];
+
+/// One file to write.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Output {
+    pub(crate) kind: Kind,
+    pub(crate) path: PathBuf,
+}
+
+impl Output {
+    fn new(path: &Path) -> Result<Self, Refusal> {
+        let ending = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
+        let kind = ENDINGS.iter().find(|(known, _)| ending.as_deref() == Some(known)).map(|(_, kind)| *kind);
+        match kind {
+            Some(kind) => Ok(Output { kind, path: path.to_path_buf() }),
+            None if ending.as_deref() == Some("json") => {
+                Err(Refusal::new(format!("-o {0}: a report is asked for with --report {0}", path.display())))
+            }
+            None => {
+                let known: Vec<String> = ENDINGS.iter().map(|(ending, _)| format!(".{ending}")).collect();
+                let known = known.join(", ");
+                Err(Refusal::new(format!("-o {}: unknown ending; known endings: {known}", path.display())))
+            }
+        }
+    }
+
+    /// The files that it consists of.
+    fn files(&self) -> Vec<PathBuf> {
+        match self.kind {
+            Kind::Tables => vec![self.path.clone(), elements_path(&self.path)],
+            _ => vec![self.path.clone()],
+        }
+    }
+}
+
+/// Folder of the default outputs.
+pub(crate) const DEFAULT_FOLDER: &str = "out";
+
+/// What to write, once the scene's name is known.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Outputs {
+    /// Files, the most valuable first.
+    pub(crate) files: Vec<Output>,
+    /// The report.
+    pub(crate) report: Option<PathBuf>,
+}
+
+impl Outputs {
+    /// Refuses what cannot be written, while nothing is lost yet.
+    pub(crate) fn check(&self, scene: &Path) -> Result<(), Refusal> {
+        let all: Vec<PathBuf> = self.files.iter().flat_map(Output::files).chain(self.report.clone()).collect();
+        let all: Vec<&Path> = all.iter().map(PathBuf::as_path).collect();
+        check_distinct(&[scene], &all)?;
+        all.into_iter().try_for_each(|path| Ok(check_writable(path)?))
+    }
+}
+
+/// A validated `ondelette light`.
+#[derive(Clone, Debug)]
+pub(crate) struct LightPlan {
+    pub(crate) scene: PathBuf,
+    pub(crate) two_sided: bool,
+    pub(crate) settings: Settings,
+    pub(crate) max_time: Option<Duration>,
+    pub(crate) threads: Option<usize>,
+    pub(crate) camera: Option<CameraRequest>,
+    /// What the user named with -o; empty for the default.
+    named: Vec<Output>,
+    report: Option<PathBuf>,
+}
+
+impl LightPlan {
+    /// Judges every flag, and whether named outputs can be written.
+    pub(crate) fn new(args: &LightArgs) -> Result<Self, Refusal> {
+        let basis = args.basis.parse().map_err(|e| Refusal::new(format!("--basis: {e}")))?;
+        let settings = Settings { basis, error: values::percent(&args.error)? };
+        let settings = settings.validated().map_err(|e| Refusal::new(format!("--error: {e}")))?;
+        let mut named = args.outputs.iter().map(|path| Output::new(path)).collect::<Result<Vec<_>, _>>()?;
+        named.sort_by_key(|o| o.kind);
+        let is_gltf =
+            args.scene.extension().is_some_and(|e| e.eq_ignore_ascii_case("gltf") || e.eq_ignore_ascii_case("glb"));
+        if args.two_sided && is_gltf {
+            return Err(Refusal::new(format!(
+                "--two-sided is for OBJ files: in {} each material says whether it is doubleSided; leave the flag out",
+                args.scene.display()
+            )));
+        }
+        let plan = LightPlan {
+            scene: args.scene.clone(),
+            two_sided: args.two_sided,
+            settings,
+            max_time: args.max_time.as_deref().map(values::duration).transpose()?,
+            threads: args.threads.as_deref().map(values::threads).transpose()?,
+            camera: args.camera.as_deref().map(values::camera).transpose()?,
+            named,
+            report: args.report.clone(),
+        };
+        Outputs { files: plan.named.clone(), report: plan.report.clone() }.check(&plan.scene)?;
+        Ok(plan)
+    }
+
+    /// Whether the files go to [`DEFAULT_FOLDER`].
+    pub(crate) fn uses_default_folder(&self) -> bool {
+        self.named.is_empty()
+    }
+
+    /// What to write for a scene of this name.
+    pub(crate) fn outputs(&self, name: &str) -> Outputs {
+        if !self.uses_default_folder() {
+            return Outputs { files: self.named.clone(), report: self.report.clone() };
+        }
+        let name: String = name.chars().map(|c| if std::path::is_separator(c) || c == ':' { '_' } else { c }).collect();
+        let file = |ending: &str| Path::new(DEFAULT_FOLDER).join(format!("{name}.{ending}"));
+        let files =
+            vec![Output { kind: Kind::Model, path: file("glb") }, Output { kind: Kind::Picture, path: file("png") }];
+        Outputs { files, report: Some(self.report.clone().unwrap_or_else(|| file("json"))) }
+    }
+
+    /// Folders in which files will be under construction.
+    pub(crate) fn folders(&self) -> Vec<PathBuf> {
+        let named = self.named.iter().map(|o| &o.path).chain(&self.report);
+        let mut folders: Vec<PathBuf> = named.filter_map(|p| p.parent()).map(Path::to_path_buf).collect();
+        if self.uses_default_folder() {
+            folders.push(DEFAULT_FOLDER.into());
+        }
+        folders.sort();
+        folders.dedup();
+        folders
+    }
+}

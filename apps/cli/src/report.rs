@@ -1,0 +1,214 @@
+//! The report: what was done, what it cost, how good it is; as JSON, and in a few lines for people.
+
+use crate::interrupt::Reason;
+use crate::plan::light::LightPlan;
+use ondelette_radiosity::ledger::Ledger;
+use ondelette_radiosity::{Rgb, Solution};
+use serde_json::{Value, json};
+use std::fmt::Write;
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// Seconds spent in each stage, in order.
+#[derive(Debug)]
+pub(crate) struct Stages {
+    start: Instant,
+    last: Instant,
+    spent: Vec<(&'static str, f64)>,
+}
+
+impl Stages {
+    pub(crate) fn start() -> Self {
+        let now = Instant::now();
+        Stages { start: now, last: now, spent: Vec::new() }
+    }
+
+    /// Books the time since the last call to `stage`.
+    pub(crate) fn end(&mut self, stage: &'static str) {
+        let now = Instant::now();
+        self.spent.push((stage, now.duration_since(self.last).as_secs_f64()));
+        self.last = now;
+    }
+
+    fn total(&self) -> f64 {
+        self.last.duration_since(self.start).as_secs_f64()
+    }
+}
+
+/// All that a report is made of.
+#[derive(Debug)]
+pub(crate) struct Record<'a> {
+    pub(crate) plan: &'a LightPlan,
+    pub(crate) solution: &'a Solution,
+    pub(crate) ledger: Option<Ledger>,
+    pub(crate) stopped: Option<Reason>,
+    pub(crate) stages: Stages,
+    pub(crate) written: Vec<PathBuf>,
+}
+
+impl Record<'_> {
+    /// Whether the promise is kept.
+    pub(crate) fn keeps_promise(&self) -> bool {
+        let statistics = self.solution.statistics();
+        statistics.finished && statistics.estimated_error <= self.solution.settings().error
+    }
+
+    /// The report as JSON. Powers are in the unit of the scene's power, lengths in metres, times in seconds; what is
+    /// not known (an error before the first balance, the ledger of an interrupted run, memory on some systems) is null.
+    pub(crate) fn json(&self) -> Value {
+        let (solution, scene) = (self.solution, self.solution.scene());
+        let (statistics, settings, forest) = (solution.statistics(), solution.settings(), solution.forest());
+        let mut levels: Vec<u64> = Vec::new();
+        for link in solution.links().as_slice() {
+            let level = forest.node(link.receiver).cell.depth as usize;
+            levels.resize(levels.len().max(level + 1), 0);
+            levels[level] += 1;
+        }
+        let mut seconds: serde_json::Map<String, Value> =
+            self.stages.spent.iter().map(|(stage, s)| ((*stage).to_owned(), json!(s))).collect();
+        seconds.insert("total".into(), json!(self.stages.total()));
+        let known = |x: f64| if x.is_finite() { json!(x) } else { Value::Null };
+        json!({
+            "program": "ondelette",
+            "version": env!("CARGO_PKG_VERSION"),
+            "scene": {
+                "name": scene.name,
+                "patches": scene.patches.len(),
+                "sides": scene.sides.len(),
+                "metres_per_unit": scene.unit.metres,
+                "warnings": scene.warnings,
+            },
+            "settings": {
+                "basis": settings.basis.to_string(),
+                "error": settings.error,
+                "two_sided": self.plan.two_sided,
+                "max_time_seconds": self.plan.max_time.map(|t| t.as_secs_f64()),
+                "threads": self.plan.threads,
+            },
+            "finished": statistics.finished,
+            "keeps_promise": self.keeps_promise(),
+            "stopped_by": self.stopped.map(|reason| reason.to_string()),
+            "seconds": seconds,
+            "elements": forest.leaves(),
+            "links": { "total": solution.links().len(), "by_level": levels },
+            "kernel_samples": statistics.kernel_samples,
+            "rays": statistics.rays,
+            "iterations": statistics.iterations,
+            "residual": known(statistics.residual),
+            "estimated_error": known(statistics.estimated_error),
+            "ledger": self.ledger.as_ref().map(|ledger| {
+                let power = |p: Rgb| (p * square_metre(solution)).0;
+                json!({
+                    "unit": scene.quantity.power_unit(),
+                    "emitted": power(ledger.emitted),
+                    "absorbed": power(ledger.absorbed),
+                    "lost_on_backs": power(ledger.lost_on_backs),
+                    "escaped": power(ledger.escaped),
+                    "closure": known(ledger.closure()),
+                    "rays": ledger.rays,
+                })
+            }),
+            "peak_memory_bytes": peak_memory(),
+            "units": {
+                "radiance": scene.quantity.radiance_unit(),
+                "irradiance": scene.quantity.irradiance_unit(),
+                "power": scene.quantity.power_unit(),
+            },
+            "outputs": self.written.iter().map(|p| p.display().to_string()).collect::<Vec<_>>(),
+        })
+    }
+
+    /// A few lines for people.
+    pub(crate) fn summary(&self) -> String {
+        let (solution, scene) = (self.solution, self.solution.scene());
+        let statistics = solution.statistics();
+        let mut text = String::new();
+        // Writing to a String does not fail.
+        let _ = self.write_summary(&mut text, scene.quantity.power_unit());
+        if !self.keeps_promise() {
+            let why = match self.stopped {
+                Some(Reason::Signal) => "stopped by Ctrl-C: this result is unfinished".to_owned(),
+                Some(Reason::Time) => "stopped by --max-time: this result is unfinished".to_owned(),
+                None => format!(
+                    "the tolerance of {} % is missed: no element may be split further",
+                    100.0 * solution.settings().error
+                ),
+            };
+            let known = if statistics.estimated_error.is_finite() { "" } else { " (before its first balance)" };
+            let _ = writeln!(text, "{why}{known}");
+        }
+        text
+    }
+
+    fn write_summary(&self, text: &mut String, unit: &str) -> std::fmt::Result {
+        let (solution, scene) = (self.solution, self.solution.scene());
+        let statistics = solution.statistics();
+        let (elements, links) = (solution.forest().leaves(), solution.links().len());
+        writeln!(
+            text,
+            "{}: {} sides, {elements} elements, {links} links, {} sweeps, {:.2} s",
+            scene.name,
+            scene.sides.len(),
+            statistics.iterations,
+            self.stages.total()
+        )?;
+        let wanted = 100.0 * solution.settings().error;
+        if statistics.estimated_error.is_finite() {
+            let error = 100.0 * statistics.estimated_error;
+            let name = scene.quantity.irradiance_name();
+            writeln!(text, "error    {error:.3} % of the mean {name} (estimated; {wanted} % asked)")?;
+        } else {
+            writeln!(text, "error    not known yet ({wanted} % asked)")?;
+        }
+        if let Some(ledger) = &self.ledger {
+            let power = |p: Rgb| significant(p.sum() * square_metre(solution));
+            writeln!(
+                text,
+                "ledger   {} {unit} emitted (r + g + b) = {} absorbed + {} lost on black backs + {} escaped, {:+.3} %",
+                power(ledger.emitted),
+                power(ledger.absorbed),
+                power(ledger.lost_on_backs),
+                power(ledger.escaped),
+                100.0 * ledger.closure()
+            )?;
+        }
+        if !self.written.is_empty() {
+            let names: Vec<String> = self.written.iter().map(|p| p.display().to_string()).collect();
+            writeln!(text, "written  {}", names.join(", "))?;
+        }
+        Ok(())
+    }
+}
+
+/// Five significant digits.
+fn significant(x: f64) -> String {
+    if x == 0.0 || !x.is_finite() {
+        return x.to_string();
+    }
+    let digits = 4 - x.abs().log10().floor() as i32;
+    if (0..=9).contains(&digits) { format!("{x:.*}", digits as usize) } else { format!("{x:.4e}") }
+}
+
+/// Square metres in a square unit of the scene.
+fn square_metre(solution: &Solution) -> f64 {
+    let metres = solution.scene().unit.metres;
+    metres * metres
+}
+
+/// The most memory this process ever held, in bytes; known on Linux.
+fn peak_memory() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok().map(|kib| 1024 * kib)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn powers_are_told_in_five_digits_whatever_their_size() {
+        let said = [0.0, 1.415_128, 16_000.2, 534_543.1, 0.000_123_456, 1e-12].map(significant);
+        assert_eq!(said, ["0", "1.4151", "16000", "5.3454e5", "0.00012346", "1.0000e-12"]);
+    }
+}

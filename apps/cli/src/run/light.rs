@@ -1,0 +1,209 @@
+//! `ondelette light`: read, solve, draw, write, report.
+
+use super::{Outcome, Refusal};
+use crate::interrupt::{Reason, Stop};
+use crate::plan::light::{DEFAULT_FOLDER, Kind, LightPlan, Outputs};
+use crate::plan::values::CameraRequest;
+use crate::progress::Progress;
+use crate::report::{Record, Stages};
+use ondelette_io::onl::write_solution;
+use ondelette_io::write::{
+    ToneMap, create_folder, elements_path, lit_model, scene_tone, write_bytes, write_exr, write_glb, write_png,
+    write_tables,
+};
+use ondelette_io::{ReadOptions, read_scene};
+use ondelette_numerics::par;
+use ondelette_radiosity::ledger::Ledger;
+use ondelette_radiosity::scene::{Camera, Shape};
+use ondelette_radiosity::view::{Renderer, frame_from_inside};
+use ondelette_radiosity::{Scene, Solution, Solver};
+use ondelette_wavelet::cell::CellFamily;
+
+/// Pixels of a picture.
+const PICTURE: [usize; 2] = [960, 720];
+/// Rays of the ledger: an error near 0.01 %.
+const LEDGER_RAYS: u64 = 1 << 20;
+/// Warnings of the scene that are shown; `info` lists them all.
+const SHOWN_WARNINGS: usize = 5;
+
+pub(crate) fn run(plan: LightPlan) -> Result<Outcome, Refusal> {
+    let stop = Stop::new(plan.max_time, plan.folders())?;
+    match plan.threads {
+        Some(n) => par::with_threads(n, || light(&plan, stop))
+            .map_err(|e| Refusal::new(format!("--threads {n}: the system gives no such number of threads: {e}")))?,
+        None => light(&plan, stop),
+    }
+}
+
+fn light(plan: &LightPlan, stop: Stop) -> Result<Outcome, Refusal> {
+    let mut stages = Stages::start();
+    let mut progress = Progress::new(plan.settings.error);
+    let scene = read_scene(&plan.scene, &ReadOptions { two_sided: plan.two_sided })?;
+    stages.end("read");
+    if stop.signalled() {
+        eprintln!("stopped by Ctrl-C before anything was computed: nothing was written");
+        return Ok(Outcome::Unfinished);
+    }
+    remark(&scene, plan);
+    let outputs = plan.outputs(&scene.name);
+    let camera = outputs.files.iter().any(|o| is_drawn(o.kind)).then(|| camera(&scene, plan.camera));
+    let camera = camera.transpose()?;
+
+    let mut solver = Solver::new(scene, plan.settings)?;
+    if plan.uses_default_folder() {
+        create_folder(DEFAULT_FOLDER.as_ref())?;
+    }
+    outputs.check(&plan.scene)?;
+    let mut stopped = None;
+    loop {
+        stopped = stopped.or(stop.asked());
+        if stopped.is_some() {
+            break;
+        }
+        match solver.step() {
+            Some(event) => progress.solving(event),
+            None => break,
+        }
+    }
+    let solution = solver.solution();
+    drop(solver);
+    stages.end("solve");
+
+    let mut record = Record { plan, solution: &solution, ledger: None, stopped, stages, written: Vec::new() };
+    write_outputs(&mut record, &outputs, camera, stop, &mut progress)?;
+    progress.finish();
+    if let Some(path) = &outputs.report {
+        record.written.push(path.clone());
+        let mut text = format!("{:#}", record.json());
+        text.push('\n');
+        write_bytes(path, text.as_bytes())?;
+    }
+    eprint!("{}", record.summary());
+    let complete = record.stopped.is_none() && record.keeps_promise();
+    Ok(if complete { Outcome::Done } else { Outcome::Unfinished })
+}
+
+/// Writes the files, the most valuable first. A Ctrl-C that comes during this stage leaves out what takes long.
+fn write_outputs(
+    record: &mut Record<'_>,
+    outputs: &Outputs,
+    camera: Option<Camera>,
+    stop: Stop,
+    progress: &mut Progress,
+) -> Result<(), Refusal> {
+    let solution = record.solution;
+    let quick = outputs.files.iter().filter(|o| !is_drawn(o.kind));
+    for output in quick {
+        progress.stage(&format!("writing {}", output.path.display()), 0.0);
+        match output.kind {
+            Kind::Solution => write_solution(&output.path, solution)?,
+            Kind::Tables => {
+                write_tables(&output.path, solution)?;
+                record.written.push(elements_path(&output.path));
+            }
+            _ => write_glb(&output.path, &lit_model(solution, scene_tone(solution), camera_of_model(record, camera)))?,
+        }
+        record.written.push(output.path.clone());
+        record.stages.end(stage_of(output.kind));
+    }
+    if record.stopped.is_none() && !stop.signalled() {
+        progress.stage("counting the energy", 0.0);
+        record.ledger = Some(Ledger::count(solution, LEDGER_RAYS));
+        record.stages.end("ledger");
+    }
+    let Some(camera) = camera else { return Ok(()) };
+    let Some(pixels) = draw(solution, &camera, record.stopped, stop, progress) else {
+        record.stopped = Some(Reason::Signal);
+        eprintln!("stopped by Ctrl-C while drawing: the picture is left out");
+        return Ok(());
+    };
+    record.stages.end("draw");
+    let size = PICTURE.map(|n| n as u32);
+    for output in outputs.files.iter().filter(|o| is_drawn(o.kind)) {
+        if output.kind == Kind::Picture {
+            let tone = ToneMap::auto(&pixels);
+            let pixels: Vec<[u8; 3]> = pixels.iter().map(|p| tone.encode(*p)).collect();
+            write_png(&output.path, size[0], size[1], &pixels)?;
+        } else {
+            let quantity = solution.scene().quantity;
+            let notes = [("quantity", quantity.radiance_name()), ("unit", quantity.radiance_unit())];
+            write_exr(&output.path, size[0], size[1], &pixels, &notes)?;
+        }
+        record.written.push(output.path.clone());
+        record.stages.end(stage_of(output.kind));
+    }
+    Ok(())
+}
+
+/// The picture, or nothing if a Ctrl-C came that had not come before.
+fn draw(
+    solution: &Solution,
+    camera: &Camera,
+    stopped: Option<Reason>,
+    stop: Stop,
+    progress: &mut Progress,
+) -> Option<Vec<[f32; 3]>> {
+    let mut renderer = Renderer::new(solution, camera, PICTURE[0], PICTURE[1]);
+    loop {
+        if stop.signalled() && stopped != Some(Reason::Signal) {
+            return None;
+        }
+        if renderer.step() {
+            return Some(renderer.into_pixels());
+        }
+        progress.stage("drawing", renderer.progress());
+    }
+}
+
+fn is_drawn(kind: Kind) -> bool {
+    matches!(kind, Kind::Picture | Kind::LinearPicture)
+}
+
+fn stage_of(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Solution => "write_onl",
+        Kind::Tables => "write_csv",
+        Kind::Model => "write_glb",
+        Kind::Picture => "write_png",
+        Kind::LinearPicture => "write_exr",
+    }
+}
+
+/// What a user should know before the wait.
+fn remark(scene: &Scene, plan: &LightPlan) {
+    for warning in scene.warnings.iter().take(SHOWN_WARNINGS) {
+        eprintln!("warning: {warning}");
+    }
+    if scene.warnings.len() > SHOWN_WARNINGS {
+        let more = scene.warnings.len() - SHOWN_WARNINGS;
+        eprintln!("warning: and {more} more; `ondelette info {}` lists them", plan.scene.display());
+    }
+    let basis = plan.settings.basis;
+    let triangles = scene.patches.iter().filter(|p| p.shape == Shape::Triangle).count();
+    if basis.family() == CellFamily::Flatlet && basis.order > 1 && triangles > 0 {
+        eprintln!("note: there are no flatlets on triangles: on {triangles} of them m{} stands in", basis.order);
+    }
+}
+
+/// The camera asked for, else the file's, else one inside the scene.
+fn camera(scene: &Scene, asked: Option<CameraRequest>) -> Result<Camera, Refusal> {
+    let Some(CameraRequest { eye, at, up, fov }) = asked else {
+        return Ok(scene.camera.unwrap_or_else(|| frame_from_inside(scene)));
+    };
+    let up = up.unwrap_or_else(|| {
+        let up = scene.camera.map_or_else(|| frame_from_inside(scene).up, |c| c.up);
+        // straight up or down: any direction across the view will do
+        let view = (at - eye).normalize();
+        if up.cross(view).length() > 1e-6 * up.length() { up } else { view.any_orthogonal_vector() }
+    });
+    let camera = Camera { eye, at, up, fov };
+    if !camera.is_usable() {
+        return Err(Refusal::new("--camera: it looks nowhere; write eye=x,y,z:at=x,y,z:fov=40"));
+    }
+    Ok(camera)
+}
+
+/// The camera that a lit model carries: that of the picture, else the file's.
+fn camera_of_model(record: &Record<'_>, camera: Option<Camera>) -> Option<Camera> {
+    camera.or(record.solution.scene().camera)
+}

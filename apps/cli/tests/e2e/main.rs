@@ -1,0 +1,8 @@
+//! The program as its users meet it: files, exit codes, messages.
+
+mod light;
+mod probe;
+mod program;
+mod refusals;
+#[cfg(unix)]
+mod stopping;
