@@ -71,8 +71,8 @@ pub fn couple<K: Kernel>(
     let mut mask_samples = 0;
     if masked {
         let smooth = moments.clone();
-        // all points with few samples first; only where they disagree is the pair worth the rest. A point must not decide
-        // for itself: stopping when its first samples agree would bias the mask towards 0 and 1.
+        // all points with few samples first; only where they disagree is the pair worth the rest. A point must not
+        // decide for itself: stopping when its first samples agree would bias the mask towards 0 and 1.
         mask_samples = settings.samples.min(FIRST_SAMPLES);
         seen = MaskSums::take(&pair, &places, shooter_basis, &mut moments, mask_samples, key);
         if seen.is_mixed() && settings.samples > mask_samples {

@@ -1,9 +1,9 @@
 //! Where the error is: the oracle's view of all links at once.
 //!
-//! Each link knows, for a unit shooter, how far its block misses in each child of its receiver (signed), how it would miss
-//! if the shooter were not as smooth as its order (unsigned), and what its mask samples may have overlooked (unsigned).
-//! Multiplied with the shooter's mean and detail, pushed down to the leaves and added up there with their signs, they
-//! estimate the error of the *sum* that the leaf receives: misses of links that cancel cost nothing.
+//! Each link knows, for a unit shooter, how far its block misses in each child of its receiver (signed), how it would
+//! miss if the shooter were not as smooth as its order (unsigned), and what its mask samples may have overlooked
+//! (unsigned). Multiplied with the shooter's mean and detail, pushed down to the leaves and added up there with their
+//! signs, they estimate the error of the *sum* that the leaf receives: misses of links that cancel cost nothing.
 
 use crate::couple::CHILDREN;
 use crate::forest::{Forest, NodeId};
@@ -174,7 +174,8 @@ impl<const C: usize> Estimate<C> {
         Estimate { total, bias, gains, ends }
     }
 
-    /// The links with the largest gains that together address `wanted`, at most `most` of them; ties to the lower index.
+    /// The links with the largest gains that together address `wanted`, at most `most` of them; ties to the lower
+    /// index.
     pub fn largest(&self, wanted: f64, most: usize) -> Vec<u32> {
         let mut order: Vec<u32> = (0..self.gains.len() as u32).filter(|&k| self.gains[k as usize] > 0.0).collect();
         order.sort_by(|&a, &b| self.gains[b as usize].total_cmp(&self.gains[a as usize]).then(a.cmp(&b)));

@@ -1,8 +1,8 @@
 //! What is compressed: a kernel K(x, y) times a mask between a receiver cell and a shooter cell.
 //!
-//! The *smooth part* K is what polynomials approximate; the *mask* in [0, 1] is whatever switches it on and off. They are
-//! kept apart so that a jump of the mask is never fitted by a polynomial of the shooter, and so that a kernel can say for
-//! certain where the mask is 1 (no samples needed) or 0 (no link at all).
+//! The *smooth part* K is what polynomials approximate; the *mask* in [0, 1] is whatever switches it on and off. They
+//! are kept apart so that a jump of the mask is never fitted by a polynomial of the shooter, and so that a kernel can
+//! say for certain where the mask is 1 (no samples needed) or 0 (no link at all).
 
 use crate::cell::Cell;
 use ondelette_wavelet::cell::CellBasis;

@@ -3,11 +3,12 @@
 //! [`cell`] (a dyadic piece of a domain) -> [`forest`] (the tree of cells over each root domain) -> [`kernel`] (what is
 //! integrated) -> [`couple`] (one block of the operator, with what its own test samples say of its error) -> [`links`]
 //! (all blocks) -> [`estimate`] (where the error is, seen by an oracle that knows the magnitudes at both ends) ->
-//! [`refine`] (ProjectKernel, second form: links replaced by links between children) -> [`transport`] (pull, gather, push).
+//! [`refine`] (ProjectKernel, second form: links replaced by links between children) -> [`transport`] (pull, gather,
+//! push).
 //!
 //! The approximate operator is the congruence P^T M P: pull P takes finest coefficients to all levels, the links M join
-//! equal or unequal levels, push P^T brings the result down. The thesis splits both ends of a link; splitting one end is
-//! just as exact for tree bases, because pull and push fill every level.
+//! equal or unequal levels, push P^T brings the result down. The thesis splits both ends of a link; splitting one end
+//! is just as exact for tree bases, because pull and push fill every level.
 //!
 //! This crate knows kernels and numbers, nothing of what they mean.
 

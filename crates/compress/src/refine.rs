@@ -1,7 +1,7 @@
 //! ProjectKernel, second form (thesis 4.5.2): a link that is not good enough becomes links between children.
 //!
-//! The work of a batch is a list of independent tasks; the forest and the links change only when the batch is committed,
-//! so that a batch given up half-way leaves everything as it was.
+//! The work of a batch is a list of independent tasks; the forest and the links change only when the batch is
+//! committed, so that a batch given up half-way leaves everything as it was.
 
 use crate::cell::Cell;
 use crate::couple::{CoupleSettings, Coupling, couple};
@@ -97,7 +97,8 @@ impl Refinement {
         self.done.len()
     }
 
-    /// Does the next `most` tasks, in parallel; true when all are done. Returns also (kernel samples, mask points) taken.
+    /// Does the next `most` tasks, in parallel; true when all are done. Returns also (kernel samples, mask points)
+    /// taken.
     pub fn step<K: Kernel>(&mut self, kernel: &K, forest: &Forest, most: usize) -> (bool, u64, u64) {
         let from = self.done.len();
         let count = most.min(self.tasks.len() - from);

@@ -36,7 +36,8 @@ fn uniform<F: Fn(u32, [f64; 2], u32, [f64; 2]) -> f64 + Sync>(
     links
 }
 
-/// The same operator with links at several levels: the root link refined `times` times over, shooter and receiver in turn.
+/// The same operator with links at several levels: the root link refined `times` times over, shooter and receiver in
+/// turn.
 fn layered<F: Fn(u32, [f64; 2], u32, [f64; 2]) -> f64 + Sync>(
     forest: &mut Forest,
     kernel: &PointKernel<F>,

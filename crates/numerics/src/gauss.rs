@@ -2,7 +2,8 @@
 
 /// Nodes and weights of the `n`-point Gauss-Legendre rule on [0, 1], nodes ascending.
 ///
-/// Exact for polynomials of degree 2n - 1. The weights sum to 1. Newton's method on the Legendre recurrence; cost O(n^2).
+/// Exact for polynomials of degree 2n - 1. The weights sum to 1. Newton's method on the Legendre recurrence; cost
+/// O(n^2).
 ///
 /// # Panics
 /// If `n` is 0.

@@ -52,8 +52,8 @@ impl Polygon {
     }
 }
 
-/// Form factor from a differential element at `x` with unit normal `n` to a polygon in front of it: the irradiance that a
-/// source of unit radiosity on the polygon brings (Lambert 1760; Gortler 3.1).
+/// Form factor from a differential element at `x` with unit normal `n` to a polygon in front of it: the irradiance that
+/// a source of unit radiosity on the polygon brings (Lambert 1760; Gortler 3.1).
 ///
 /// `polygon` must lie in the half-space n . (p - x) >= 0 (see [`Polygon::clipped`]) and show its front to x, corners
 /// counter-clockwise seen from x's side. Exact for any size and distance; 0 for fewer than three corners.

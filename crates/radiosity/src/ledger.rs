@@ -1,7 +1,7 @@
 //! The energy ledger: what is emitted must be absorbed, lost on black backs, or escape.
 //!
-//! Absorption at fronts is read from the solution; losses and escapes are counted by rays that leave every side with its
-//! radiosity. The two sides of the ledger are independent, so that closing says something.
+//! Absorption at fronts is read from the solution; losses and escapes are counted by rays that leave every side with
+//! its radiosity. The two sides of the ledger are independent, so that closing says something.
 
 use crate::kernel::LightKernel;
 use crate::rgb::Rgb;

@@ -1,8 +1,8 @@
 //! What blocks light: rays and shafts against all patches, through a bounding volume hierarchy (crate obvhs).
 //!
-//! The hierarchy only finds candidates, in f32 boxes grown by a margin; every hit is decided in f64 on the exact patch. It
-//! lives in coordinates in which the scene has diagonal 1 and its centre at 0, so that no unit of length is better than
-//! another.
+//! The hierarchy only finds candidates, in f32 boxes grown by a margin; every hit is decided in f64 on the exact patch.
+//! It lives in coordinates in which the scene has diagonal 1 and its centre at 0, so that no unit of length is better
+//! than another.
 //! A patch blocks from both sides. Self-hits are excluded by patch index, not by moving the ray.
 
 use crate::scene::{Patch, Scene, Shape};
@@ -160,8 +160,8 @@ impl Occluders {
         })
     }
 
-    /// The first patch along a ray, leaving out what `skips(patch, hit from the front)` says (where the ray starts; backs
-    /// that cameras look through).
+    /// The first patch along a ray, leaving out what `skips(patch, hit from the front)` says (where the ray starts;
+    /// backs that cameras look through).
     pub fn first_hit(&self, from: DVec3, direction: DVec3, skips: impl Fn(u32, bool) -> bool) -> Option<Hit> {
         // one diagonal long, so that t is in diagonals inside the hierarchy
         let stretch = self.scale / direction.length();

@@ -44,7 +44,11 @@ impl fmt::Display for Basis {
 
 /// A name that is no basis.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("'{0}' is no basis: choose haar, m1 to m{m}, or f1 to f{f}", m = CellBasis::MAX_MULTIWAVELET, f = CellBasis::MAX_FLATLET)]
+#[error(
+    "'{0}' is no basis: choose haar, m1 to m{m}, or f1 to f{f}",
+    m = CellBasis::MAX_MULTIWAVELET,
+    f = CellBasis::MAX_FLATLET
+)]
 pub struct BasisError(pub String);
 
 impl FromStr for Basis {

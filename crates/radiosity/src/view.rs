@@ -60,7 +60,7 @@ impl<'a> Renderer<'a> {
     /// Renders the next band of rows; true when the picture is complete.
     pub fn step(&mut self) -> bool {
         let [width, height] = self.size;
-        let from = if width == 0 { height } else { self.pixels.len() / width };
+        let from = self.pixels.len().checked_div(width).unwrap_or(height);
         let rows = ROWS.min(height - from);
         let band = par::map(rows * width, |i| self.pixel(i % width, from + i / width));
         self.pixels.extend(band);
@@ -124,8 +124,9 @@ pub fn render(solution: &Solution, camera: &Camera, width: usize, height: usize)
     renderer.into_pixels()
 }
 
-/// A camera that frames the scene from inside: of a few places near the walls, corners and the middle, the one that sees
-/// the most of the scene's fronts. Up is +Y where the file states its conventions (glTF), else the shortest extent.
+/// A camera that frames the scene from inside: of a few places near the walls, corners and the middle, the one that
+/// sees the most of the scene's fronts. Up is +Y where the file states its conventions (glTF), else the shortest
+/// extent.
 pub fn frame_from_inside(scene: &Scene) -> Camera {
     let [low, high] = scene.bounds;
     let size = high - low;

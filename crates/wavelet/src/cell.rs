@@ -5,7 +5,8 @@
 //! ProjectKernel (4.5.2), so wavelets themselves never appear here; the one-dimensional tree families have them.
 //!
 //! Heights are chosen so that a coefficient has the unit of the function: multiwavelets are orthonormal for the *mean*
-//! over the cell (the first function is 1), flatlet boxes have height 1. Then for both families, with the same matrices T:
+//! over the cell (the first function is 1), flatlet boxes have height 1. Then for both families, with the same matrices
+//! T:
 //! * push (a function seen from the children): `child[j] += sum_i T_c[i][j] parent[i]`;
 //! * pull (its adjoint): `parent[i] = 1/arity sum_c sum_j T_c[i][j] child_c[j]`.
 //!
@@ -88,7 +89,8 @@ impl CellShape {
         }
     }
 
-    /// One point in each child, off every Gauss node and off every symmetry axis: where a polynomial fit is put to the test.
+    /// One point in each child, off every Gauss node and off every symmetry axis: where a polynomial fit is put to the
+    /// test.
     pub fn test_points(self) -> Vec<[f64; 2]> {
         match self {
             CellShape::Interval => vec![[0.06, 0.0], [0.60, 0.0]],
@@ -103,7 +105,8 @@ impl CellShape {
 pub enum CellFamily {
     /// Orthonormal polynomials: tensor Legendre of degree < M in each variable; on triangles of total degree < M.
     Multiwavelet,
-    /// M boxes an axis. On triangles there are none: the multiwavelet of that order stands in (see [`CellBasis::falls_back`]).
+    /// M boxes an axis. On triangles there are none: the multiwavelet of that order stands in (see
+    /// [`CellBasis::falls_back`]).
     Flatlet,
 }
 
@@ -467,8 +470,9 @@ fn jacobi(a: usize, y: f64) -> [f64; CellBasis::MAX_MULTIWAVELET] {
     p
 }
 
-/// One axis of the flatlets' dual two-scale relation: the polynomial of degree M - 1 with mean 1 on box `i` and 0 on the
-/// other boxes, averaged over the M boxes of one half. Row-major `[i][j]`. Exact: differences of a Lagrange primitive.
+/// One axis of the flatlets' dual two-scale relation: the polynomial of degree M - 1 with mean 1 on box `i` and 0 on
+/// the other boxes, averaged over the M boxes of one half. Row-major `[i][j]`. Exact: differences of a Lagrange
+/// primitive.
 fn flatlet_axis(m: usize, half: usize) -> Vec<f64> {
     // P(x) = integral from 0 to x (in units of one box); P(k) = number of unit boxes passed of box i
     let lagrange = |i: usize, x: f64| -> f64 {

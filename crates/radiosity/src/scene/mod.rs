@@ -132,7 +132,8 @@ pub struct Provenance {
     pub object: u32,
     /// Index of each face (OBJ) or triangle (glTF) of that object under this patch: one or two.
     pub faces: Vec<u32>,
-    /// First texture coordinates at the patch's corners (o, o+u, o+v and for parallelograms o+u+v), if the file has them.
+    /// First texture coordinates at the patch's corners (o, o+u, o+v and for parallelograms o+u+v), if the file has
+    /// them.
     pub uv0: Option<[[f64; 2]; 4]>,
     /// Second texture coordinates (lightmaps), likewise.
     pub uv1: Option<[[f64; 2]; 4]>,

@@ -1,0 +1,57 @@
+//! One side of a patch as the kernel sees it.
+
+use glam::DVec3;
+use ondelette_wavelet::cell::CellShape;
+
+/// One side as a kernel sees it.
+#[derive(Clone, Copy, Debug)]
+pub struct SideFrame {
+    /// Corner.
+    pub origin: DVec3,
+    /// Edges; their cross product points to the side's front.
+    pub edges: [DVec3; 2],
+    /// Unit normal.
+    pub normal: DVec3,
+    /// Area of the side.
+    pub area: f64,
+    /// Patch that this side belongs to.
+    pub patch: u32,
+    /// Whether it ever sends light out: it emits or reflects.
+    pub shoots: bool,
+    /// Square or triangle.
+    pub shape: CellShape,
+}
+
+impl SideFrame {
+    /// Side-local coordinates of the point of the side that is closest to `point`.
+    pub fn closest(&self, point: DVec3) -> [f64; 2] {
+        let [u, v] = self.edges;
+        let d = point - self.origin;
+        let n = u.cross(v);
+        let inverse = 1.0 / n.length_squared();
+        let [s, t] = [v.cross(n).dot(d) * inverse, n.cross(u).dot(d) * inverse];
+        let triangle = self.shape == CellShape::Triangle;
+        let inside = s >= 0.0 && t >= 0.0 && if triangle { s + t <= 1.0 } else { s <= 1.0 && t <= 1.0 };
+        if inside {
+            return [s, t];
+        }
+        // the closest point of each edge, in local coordinates
+        let edges: &[[[f64; 2]; 2]] = if triangle {
+            &[[[0.0, 0.0], [1.0, 0.0]], [[1.0, 0.0], [0.0, 1.0]], [[0.0, 1.0], [0.0, 0.0]]]
+        } else {
+            &[[[0.0, 0.0], [1.0, 0.0]], [[1.0, 0.0], [1.0, 1.0]], [[1.0, 1.0], [0.0, 1.0]], [[0.0, 1.0], [0.0, 0.0]]]
+        };
+        let place = |x: [f64; 2]| self.origin + u * x[0] + v * x[1];
+        let mut best = ([0.0; 2], f64::INFINITY);
+        for [a, b] in edges {
+            let (p, q) = (place(*a), place(*b));
+            let k = ((point - p).dot(q - p) / (q - p).length_squared()).clamp(0.0, 1.0);
+            let at = [a[0] + k * (b[0] - a[0]), a[1] + k * (b[1] - a[1])];
+            let distance = place(at).distance(point);
+            if distance < best.1 {
+                best = (at, distance);
+            }
+        }
+        best.0
+    }
+}
