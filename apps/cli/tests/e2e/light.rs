@@ -149,3 +149,20 @@ fn help_mentions_every_flag_and_ends_with_0() {
     }
     assert!(place.run("--version").with_code(0).out.contains(env!("CARGO_PKG_VERSION")));
 }
+
+#[cfg(unix)]
+#[test]
+fn a_closed_pipe_is_no_reason_to_panic() {
+    let place = Place::new();
+    room(&place);
+    for arguments in ["info room.obj", "light room.obj --error 5% -o room.onl", "light missing.obj"] {
+        let mut command = place.command(arguments);
+        // readers that are gone before the program writes
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let status = command.stdout(writer.try_clone().unwrap()).stderr(writer).status().unwrap();
+        let expected = if arguments.ends_with("missing.obj") { 2 } else { 0 };
+        assert_eq!(status.code(), Some(expected), "{arguments}");
+    }
+    assert!(place.read("room.onl").starts_with(b"ONDELETTE"));
+}
