@@ -1,6 +1,8 @@
 //! What blocks light: rays and shafts against all patches, through a bounding volume hierarchy (crate obvhs).
 //!
-//! The hierarchy only finds candidates, in f32 boxes grown by a margin; every hit is decided in f64 on the exact patch.
+//! The hierarchy only finds candidates, in f32 boxes grown by a margin; every hit is decided in f64 on the exact patch. It
+//! lives in coordinates in which the scene has diagonal 1 and its centre at 0, so that no unit of length is better than
+//! another.
 //! A patch blocks from both sides. Self-hits are excluded by patch index, not by moving the ray.
 
 use crate::scene::{Patch, Scene, Shape};
@@ -80,26 +82,38 @@ pub struct Occluders {
     corners: Vec<Vec<DVec3>>,
     wide: CwBvh,
     binary: Bvh2,
+    centre: DVec3,
     scale: f64,
 }
 
 /// Segments end this share of their length before they reach what they aim at.
 const RELATIVE_EPSILON: f64 = 1e-6;
+/// Margin of the boxes, in units of the scene's diagonal: above the rounding of f32 rays.
+const MARGIN: f32 = 1e-6;
+/// The wide hierarchy overlooks boxes that end before t = 1e-4, so its rays start this much earlier.
+const RUN_UP: f64 = 2e-4;
+
+fn narrow(v: DVec3) -> Vec3A {
+    Vec3A::new(v.x as f32, v.y as f32, v.z as f32)
+}
+
+fn widen(v: Vec3A) -> DVec3 {
+    DVec3::new(f64::from(v.x), f64::from(v.y), f64::from(v.z))
+}
 
 impl Occluders {
     /// Builds the hierarchy. Cost O(n log n).
     pub fn new(scene: &Scene) -> Self {
         let scale = scene.diagonal();
-        let largest = scene.bounds.iter().map(|b| b.abs().max_element()).fold(0.0, f64::max);
-        let margin = (1e-6 * scale + 2e-7 * largest) as f32;
+        let centre = 0.5 * (scene.bounds[0] + scene.bounds[1]);
         let corners: Vec<Vec<DVec3>> = scene.patches.iter().map(Patch::corners).collect();
         let boxes: Vec<Bounded> = corners
             .iter()
             .map(|c| {
                 let low = c.iter().fold(DVec3::INFINITY, |a, b| a.min(*b));
                 let high = c.iter().fold(DVec3::NEG_INFINITY, |a, b| a.max(*b));
-                let narrow = |v: DVec3| Vec3A::new(v.x as f32, v.y as f32, v.z as f32);
-                Bounded(Aabb::new(narrow(low) - margin, narrow(high) + margin))
+                let unit = |v: DVec3| narrow((v - centre) / scale);
+                Bounded(Aabb::new(unit(low) - MARGIN, unit(high) + MARGIN))
             })
             .collect();
         let mut spent = std::time::Duration::ZERO;
@@ -109,8 +123,20 @@ impl Occluders {
             corners,
             wide: obvhs::cwbvh::builder::build_cwbvh(&boxes, params, &mut spent),
             binary: obvhs::bvh2::builder::build_bvh2(&boxes, params, &mut spent),
+            centre,
             scale,
         }
+    }
+
+    /// The ray from + t direction in the hierarchy's coordinates, with its run-up; t is `RUN_UP` larger there.
+    fn ray(&self, from: DVec3, direction: DVec3, most: f32) -> Ray {
+        let d = direction / self.scale;
+        Ray::new(narrow((from - self.centre) / self.scale - d * RUN_UP), narrow(d), 0.0, most)
+    }
+
+    /// Box of a node in scene coordinates.
+    fn world(&self, aabb: &Aabb) -> (DVec3, DVec3) {
+        (widen(aabb.min) * self.scale + self.centre, widen(aabb.max) * self.scale + self.centre)
     }
 
     /// Length below which two points count as one: 1e-7 of the scene's diagonal.
@@ -121,8 +147,7 @@ impl Occluders {
     /// Whether anything but the two given patches lies between two points.
     pub fn blocked(&self, from: DVec3, to: DVec3, except: [u32; 2]) -> bool {
         let d = to - from;
-        let narrow = |v: DVec3| Vec3A::new(v.x as f32, v.y as f32, v.z as f32);
-        let ray = Ray::new(narrow(from), narrow(d), 0.0, 1.0);
+        let ray = self.ray(from, d, 1.001);
         !self.wide.ray_traverse_miss(ray, |_, id| {
             let patch = self.wide.primitive_indices[id];
             if patch == except[0] || patch == except[1] {
@@ -138,9 +163,11 @@ impl Occluders {
     /// The first patch along a ray, leaving out what `skips(patch, hit from the front)` says (where the ray starts; backs
     /// that cameras look through).
     pub fn first_hit(&self, from: DVec3, direction: DVec3, skips: impl Fn(u32, bool) -> bool) -> Option<Hit> {
-        let narrow = |v: DVec3| Vec3A::new(v.x as f32, v.y as f32, v.z as f32);
-        let ray = Ray::new(narrow(from), narrow(direction), 0.0, f32::INFINITY);
-        let least = RELATIVE_EPSILON * self.scale / direction.length();
+        // one diagonal long, so that t is in diagonals inside the hierarchy
+        let stretch = self.scale / direction.length();
+        let ray = self.ray(from, direction * stretch, f32::INFINITY);
+        // where the ray starts is skipped by name, so this only has to beat rounding
+        let least = 1e-11 * stretch;
         let mut nearest: Option<(f64, u32)> = None;
         let mut hit = RayHit::none();
         self.wide.ray_traverse(ray, &mut hit, |_, id| {
@@ -153,7 +180,7 @@ impl Occluders {
                         nearest = Some((t, patch));
                     }
                     // a little farther than it is, so that rounding to f32 hides nothing in front of it
-                    (t * (1.0 + 1e-6)) as f32
+                    ((t / stretch + RUN_UP) * (1.0 + 1e-6)) as f32
                 }
                 _ => f32::INFINITY,
             }
@@ -169,10 +196,10 @@ impl Occluders {
     pub fn near(&self, point: DVec3, radius: f64) -> Vec<u32> {
         let mut found = Vec::new();
         let mut stack = if self.binary.nodes.is_empty() { Vec::new() } else { vec![0u32] };
-        let wide = |v: Vec3A| DVec3::new(f64::from(v.x), f64::from(v.y), f64::from(v.z));
         while let Some(n) = stack.pop() {
             let node = &self.binary.nodes[n as usize];
-            let nearest = point.clamp(wide(node.aabb.min), wide(node.aabb.max));
+            let (low, high) = self.world(&node.aabb);
+            let nearest = point.clamp(low, high);
             if nearest.distance(point) > radius {
                 continue;
             }
@@ -197,8 +224,8 @@ impl Occluders {
         let mut stack = vec![0u32];
         while let Some(n) = stack.pop() {
             let node = &self.binary.nodes[n as usize];
-            let wide = |v: Vec3A| DVec3::new(f64::from(v.x), f64::from(v.y), f64::from(v.z));
-            if shaft.misses_box(wide(node.aabb.min), wide(node.aabb.max)) {
+            let (low, high) = self.world(&node.aabb);
+            if shaft.misses_box(low, high) {
                 continue;
             }
             if node.prim_count == 0 {

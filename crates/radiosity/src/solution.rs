@@ -4,7 +4,8 @@ use crate::rgb::Rgb;
 use crate::scene::Scene;
 use crate::settings::Settings;
 use glam::DVec3;
-use ondelette_compress::{Forest, Links};
+use ondelette_compress::{Forest, Links, NodeId};
+use ondelette_wavelet::cell::CellShape;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -24,6 +25,9 @@ pub struct Statistics {
     /// Visibility rays cast.
     pub rays: u64,
 }
+
+/// Closer to an element's edge than this (in its local units) counts as on it.
+const EDGE: f64 = 1e-7;
 
 /// A solved (or half-solved) scene.
 #[derive(Clone, Debug)]
@@ -90,13 +94,36 @@ impl Solution {
     }
 
     /// Irradiance at side-local coordinates, in the scene's irradiance unit. Not clamped.
+    ///
+    /// On a common edge of elements, where the piecewise polynomial may jump, the mean of the limits.
     pub fn irradiance(&self, side: usize, at: [f64; 2]) -> Rgb {
         let (leaf, x) = self.forest.locate(side, at);
+        let cell = &self.forest.node(leaf).cell;
+        let triangle = cell.shape == CellShape::Triangle;
+        let rim = if triangle { 1.0 - x[0] - x[1] } else { (1.0 - x[0]).min(1.0 - x[1]) };
+        if x[0].min(x[1]).min(rim) > EDGE {
+            return self.inside(leaf, x);
+        }
+        let step = 2.0 * EDGE * cell.scale.abs();
+        let (mut sum, mut count) = (Rgb::BLACK, 0.0);
+        for [s, t] in [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]] {
+            let near = [at[0] + s * step, at[1] + t * step];
+            let far = if triangle { near[0] + near[1] } else { near[0].max(near[1]) };
+            if near[0].min(near[1]) >= 0.0 && far <= 1.0 {
+                let (leaf, x) = self.forest.locate(side, near);
+                sum += self.inside(leaf, x);
+                count += 1.0;
+            }
+        }
+        if count > 0.0 { sum * (1.0 / count) } else { self.inside(leaf, x) }
+    }
+
+    /// The polynomial of one leaf.
+    fn inside(&self, leaf: NodeId, x: [f64; 2]) -> Rgb {
         let basis = self.forest.basis_of(leaf);
         let mut values = [0.0; 36];
         basis.eval(x, &mut values);
-        let stride = self.forest.stride();
-        let own = &self.irradiance[leaf.index() * stride..leaf.index() * stride + basis.len()];
+        let own = &self.irradiance[leaf.index() * self.forest.stride()..][..basis.len()];
         own.iter().zip(&values).fold(Rgb::BLACK, |sum, (c, v)| sum + Rgb(*c) * *v)
     }
 
@@ -111,8 +138,7 @@ impl Solution {
         let root = self.forest.roots()[side];
         let whole = self.forest.node(root).measure;
         let mut sum = Rgb::BLACK;
-        self.each_leaf(|leaf, root, measure, mean| {
-            let _ = leaf;
+        self.each_leaf(|_, root, measure, mean| {
             if root == side {
                 sum += mean * (measure / whole);
             }

@@ -120,7 +120,7 @@ const PAIRS_A_STEP: usize = 128;
 /// Rays of a receiver point in the first, coarse linking.
 const COARSE_RAYS: usize = 16;
 /// Most rays of a receiver point.
-const MOST_RAYS: usize = 256;
+const MOST_RAYS: usize = 1024;
 /// Krylov vectors kept before a restart.
 const RESTART: usize = 60;
 /// Deepest split.
@@ -358,7 +358,7 @@ impl Solver {
             let link = self.links.as_slice()[k as usize];
             let shot: f64 = magnitudes.mean[link.shooter.index()].iter().sum();
             let share = f64::from(link.strength) * shot / unit;
-            let samples = (share / self.settings.error).powf(4.0 / 3.0).clamp(4.0, MOST_RAYS as f64) as usize;
+            let samples = (4.0 * share / self.settings.error).powf(4.0 / 3.0).clamp(4.0, MOST_RAYS as f64) as usize;
             let negligible = if shot > 0.0 { 0.003 * self.settings.error * unit / shot } else { 0.0 };
             CoupleSettings { negligible, samples }
         };
