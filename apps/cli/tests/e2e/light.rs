@@ -16,6 +16,8 @@ fn without_outputs_a_picture_a_model_and_a_report_go_to_out() {
     assert!(place.read("out/cornell.png").starts_with(b"\x89PNG"));
     assert!(place.read("out/cornell.glb").starts_with(b"glTF"));
     let glb = String::from_utf8_lossy(&place.read("out/cornell.glb")).into_owned();
+    // a lit model is a result, not a scene
+    assert!(place.run("info out/cornell.glb").with_code(2).err.contains("out/cornell.glb: all of it is unlit"));
     assert!(glb.contains("KHR_materials_unlit") && glb.contains("exposure") && glb.contains("COLOR_0"));
 }
 
