@@ -21,7 +21,7 @@ fn main() -> ExitCode {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::Unfinished) => ExitCode::from(1),
         Err(refusal) => {
-            eprintln!("error: {refusal}");
+            run::tell(format_args!("error: {refusal}"));
             ExitCode::from(2)
         }
     }

@@ -65,13 +65,13 @@ impl Progress {
             }
             Event::Solved { .. } => "judging".into(),
         };
-        let left = self.seconds_left(now).map_or(String::new(), |s| format!("; about {s:.0} s left"));
+        let left = self.seconds_left(now).map_or(String::new(), |s| format!("about {s:.0} s left; "));
         let error = if self.error.is_empty() { String::new() } else { format!("{}; ", self.error) };
         let share = match event {
             Event::Linking { done, total } if self.history.is_empty() => 0.1 * done as f64 / total.max(1) as f64,
             _ => 0.1 + 0.9 * self.descent(),
         };
-        self.stage(&format!("{error}{what}{left}"), share);
+        self.stage(&format!("{left}{error}{what}"), share);
     }
 
     /// How far the error has come down, on its logarithm.

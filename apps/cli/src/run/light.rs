@@ -1,6 +1,6 @@
 //! `ondelette light`: read, solve, draw, write, report.
 
-use super::{Outcome, Refusal};
+use super::{Outcome, Refusal, tell};
 use crate::interrupt::{Reason, Stop};
 use crate::plan::light::{DEFAULT_FOLDER, Kind, LightPlan, Outputs};
 use crate::plan::values::CameraRequest;
@@ -41,7 +41,7 @@ fn light(plan: &LightPlan, stop: Stop) -> Result<Outcome, Refusal> {
     let scene = read_scene(&plan.scene, &ReadOptions { two_sided: plan.two_sided })?;
     stages.end("read");
     if stop.signalled() {
-        eprintln!("stopped by Ctrl-C before anything was computed: nothing was written");
+        tell("stopped by Ctrl-C before anything was computed: nothing was written");
         return Ok(Outcome::Unfinished);
     }
     remark(&scene, plan);
@@ -78,7 +78,7 @@ fn light(plan: &LightPlan, stop: Stop) -> Result<Outcome, Refusal> {
         text.push('\n');
         write_bytes(path, text.as_bytes())?;
     }
-    eprint!("{}", record.summary());
+    tell(record.summary().trim_end());
     let complete = record.stopped.is_none() && record.keeps_promise();
     Ok(if complete { Outcome::Done } else { Outcome::Unfinished })
 }
@@ -114,7 +114,7 @@ fn write_outputs(
     let Some(camera) = camera else { return Ok(()) };
     let Some(pixels) = draw(solution, &camera, record.stopped, stop, progress) else {
         record.stopped = Some(Reason::Signal);
-        eprintln!("stopped by Ctrl-C while drawing: the picture is left out");
+        tell("stopped by Ctrl-C while drawing: the picture is left out");
         return Ok(());
     };
     record.stages.end("draw");
@@ -172,16 +172,19 @@ fn stage_of(kind: Kind) -> &'static str {
 /// What a user should know before the wait.
 fn remark(scene: &Scene, plan: &LightPlan) {
     for warning in scene.warnings.iter().take(SHOWN_WARNINGS) {
-        eprintln!("warning: {warning}");
+        tell(format_args!("warning: {warning}"));
     }
     if scene.warnings.len() > SHOWN_WARNINGS {
         let more = scene.warnings.len() - SHOWN_WARNINGS;
-        eprintln!("warning: and {more} more; `ondelette info {}` lists them", plan.scene.display());
+        tell(format_args!("warning: and {more} more; `ondelette info {}` lists them", plan.scene.display()));
     }
     let basis = plan.settings.basis;
     let triangles = scene.patches.iter().filter(|p| p.shape == Shape::Triangle).count();
     if basis.family() == CellFamily::Flatlet && basis.order > 1 && triangles > 0 {
-        eprintln!("note: there are no flatlets on triangles: on {triangles} of them m{} stands in", basis.order);
+        tell(format_args!(
+            "note: there are no flatlets on triangles: on {triangles} of them m{} stands in",
+            basis.order
+        ));
     }
 }
 

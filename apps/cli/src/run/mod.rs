@@ -54,6 +54,11 @@ macro_rules! refusal_from {
 }
 refusal_from!(ReadError, WriteError, OnlError, SolveError);
 
+/// Says something to the person at the terminal. If nobody listens, the work goes on.
+pub(crate) fn tell(message: impl fmt::Display) {
+    let _ = writeln!(io::stderr().lock(), "{message}");
+}
+
 /// Writes data to standard output. Whoever closes the pipe has seen enough: that is no error.
 fn print(text: &str) -> Result<(), Refusal> {
     let mut out = io::stdout().lock();

@@ -1,6 +1,6 @@
 //! `ondelette probe`: points in, values out.
 
-use super::{Outcome, Refusal, print};
+use super::{Outcome, Refusal, print, tell};
 use crate::args::ProbeArgs;
 use crate::plan::check_distinct;
 use glam::DVec3;
@@ -50,7 +50,7 @@ pub(crate) fn run(args: &ProbeArgs) -> Result<Outcome, Refusal> {
     let solution = read_solution(&args.solution)?;
     if !solution.is_finished() {
         let percent = 100.0 * solution.statistics().estimated_error;
-        eprintln!("note: {} is unfinished; its estimated error is {percent:.3} %", args.solution.display());
+        tell(format_args!("note: {} is unfinished; its estimated error is {percent:.3} %", args.solution.display()));
     }
     let answers = answer(&solution, &points, args.gather);
     refuse_points_off_surfaces(&args.points, &solution, &points, &answers)?;

@@ -16,6 +16,8 @@ fn without_outputs_a_picture_a_model_and_a_report_go_to_out() {
     assert!(place.read("out/cornell.png").starts_with(b"\x89PNG"));
     assert!(place.read("out/cornell.glb").starts_with(b"glTF"));
     let glb = String::from_utf8_lossy(&place.read("out/cornell.glb")).into_owned();
+    // a lit model is a result, not a scene
+    assert!(place.run("info out/cornell.glb").with_code(2).err.contains("out/cornell.glb: all of it is unlit"));
     assert!(glb.contains("KHR_materials_unlit") && glb.contains("exposure") && glb.contains("COLOR_0"));
 }
 
@@ -148,4 +150,21 @@ fn help_mentions_every_flag_and_ends_with_0() {
         assert!(all.contains(said), "no '{said}' in:\n{all}");
     }
     assert!(place.run("--version").with_code(0).out.contains(env!("CARGO_PKG_VERSION")));
+}
+
+#[cfg(unix)]
+#[test]
+fn a_closed_pipe_is_no_reason_to_panic() {
+    let place = Place::new();
+    room(&place);
+    for arguments in ["info room.obj", "light room.obj --error 5% -o room.onl", "light missing.obj"] {
+        let mut command = place.command(arguments);
+        // readers that are gone before the program writes
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let status = command.stdout(writer.try_clone().unwrap()).stderr(writer).status().unwrap();
+        let expected = if arguments.ends_with("missing.obj") { 2 } else { 0 };
+        assert_eq!(status.code(), Some(expected), "{arguments}");
+    }
+    assert!(place.read("room.onl").starts_with(b"ONDELETTE"));
 }

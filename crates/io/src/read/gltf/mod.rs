@@ -154,6 +154,11 @@ fn draft(root: &Root, data: &Data<'_>, path: &Path) -> Result<SceneDraft, String
             }
         }
     }
+    if faces.is_empty() && unlit > 0 {
+        return Err(
+            "all of it is unlit (KHR_materials_unlit), as in a lit model: give the scene that it was made from".into(),
+        );
+    }
     let mut note = |count: usize, what: &str| {
         if count > 0 {
             warnings.push(format!("{count} primitive{} {what}", if count == 1 { "" } else { "s" }));
