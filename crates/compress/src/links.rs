@@ -101,43 +101,51 @@ impl Links {
         }
     }
 
-    /// Removes the links whose index is marked, adds new ones, and sorts. Cost O(n log n).
+    /// Removes the links whose index is marked and adds new ones, in order. Cost linear in the links kept.
     ///
     /// # Panics
     /// If `removed` is shorter than the number of links.
     pub fn replace(&mut self, forest: &Forest, removed: &[bool], added: Vec<(NodeId, NodeId, Coupling)>) {
-        let kept = self.links.iter().zip(removed).filter(|(_, gone)| !**gone).map(|(l, _)| (*l, None));
-        let mut all: Vec<(Link, Option<Vec<f64>>)> = kept.collect();
-        for (receiver, shooter, c) in added {
-            let link = Link {
-                receiver,
-                shooter,
-                orders: c.orders,
-                masked: c.masked,
-                block: 0,
-                residual: c.residual.map(|r| r as f32),
-                strength: c.strength as f32,
-                roughness: c.roughness as f32,
-                spread: c.spread as f32,
-                unseen: c.unseen as f32,
-            };
-            all.push((link, Some(c.block)));
-        }
-        all.sort_by_key(|(l, _)| (l.receiver, l.shooter));
+        let mut added = added;
+        added.sort_by_key(|(receiver, shooter, _)| (*receiver, *shooter));
         let size = |l: &Link| {
             let n = |id, order: u8| forest.basis_of(id).truncated(usize::from(order)).len();
             n(l.receiver, l.orders[0]) * n(l.shooter, l.orders[1])
         };
-        let mut links = Vec::with_capacity(all.len());
+        let mut links = Vec::with_capacity(self.links.len() + added.len());
         let mut blocks = Vec::with_capacity(self.blocks.len());
-        for (mut link, fresh) in all {
+        let mut kept = self.links.iter().zip(removed).filter(|(_, gone)| !**gone).map(|(l, _)| *l).peekable();
+        let mut fresh = added.into_iter().peekable();
+        // both lists are sorted: one merge
+        loop {
+            let old = kept.peek().map(|l| (l.receiver, l.shooter));
+            let new = fresh.peek().map(|(r, s, _)| (*r, *s));
             let start = blocks.len() as u64;
-            match fresh {
-                Some(block) => blocks.extend_from_slice(&block),
-                None => blocks.extend_from_slice(&self.blocks[link.block as usize..link.block as usize + size(&link)]),
+            match (old, new) {
+                (None, None) => break,
+                (Some(o), n) if n.is_none_or(|n| o <= n) => {
+                    let Some(mut link) = kept.next() else { break };
+                    blocks.extend_from_slice(&self.blocks[link.block as usize..link.block as usize + size(&link)]);
+                    link.block = start;
+                    links.push(link);
+                }
+                _ => {
+                    let Some((receiver, shooter, c)) = fresh.next() else { break };
+                    blocks.extend_from_slice(&c.block);
+                    links.push(Link {
+                        receiver,
+                        shooter,
+                        orders: c.orders,
+                        masked: c.masked,
+                        block: start,
+                        residual: c.residual.map(|r| r as f32),
+                        strength: c.strength as f32,
+                        roughness: c.roughness as f32,
+                        spread: c.spread as f32,
+                        unseen: c.unseen as f32,
+                    });
+                }
             }
-            link.block = start;
-            links.push(link);
         }
         self.links = links;
         self.blocks = blocks;

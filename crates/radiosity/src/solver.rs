@@ -210,6 +210,13 @@ impl Solver {
         )
     }
 
+    /// The state as it stands, without a copy: for the end.
+    pub fn into_solution(mut self) -> Solution {
+        self.statistics.estimated_error = self.error;
+        self.statistics.finished = matches!(self.phase, Phase::Finished) && !self.stalled;
+        Solution::new(self.scene, self.settings, self.forest, self.links, self.irradiance, self.statistics)
+    }
+
     fn work(
         &mut self,
         mut batch: Refinement,

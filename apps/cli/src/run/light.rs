@@ -65,8 +65,7 @@ fn light(plan: &LightPlan, stop: Stop) -> Result<Outcome, Refusal> {
             None => break,
         }
     }
-    let solution = solver.solution();
-    drop(solver);
+    let solution = solver.into_solution();
     stages.end("solve");
 
     let mut record = Record { plan, solution: &solution, ledger: None, stopped, stages, written: Vec::new() };
