@@ -1,7 +1,7 @@
 //! One block of the operator, and what test samples say of its error (thesis 4.5.3: fit on one set, test on another).
 
 use crate::cell::Cell;
-use crate::kernel::{Kernel, Pair};
+use crate::kernel::{Detail, Kernel, Pair};
 use ondelette_numerics::seed;
 use ondelette_wavelet::cell::CellBasis;
 
@@ -15,6 +15,9 @@ pub struct CoupleSettings {
     pub negligible: f64,
     /// Most mask samples for one receiver point.
     pub samples: usize,
+    /// The last look at a pair: all mask samples at once, and the shooter's present detail taken into account even where
+    /// nothing masks it.
+    pub thorough: bool,
 }
 
 /// One block with its error measures. Strengths are for a shooter of constant value 1.
@@ -67,20 +70,30 @@ pub fn couple<K: Kernel>(
     for (x, row) in places.iter().zip(moments.chunks_mut(ns)) {
         pair.moments(*x, shooter_basis, row);
     }
+    let nothing = moments.iter().all(|m| *m == 0.0);
     let mut seen = MaskSums::default();
     let mut mask_samples = 0;
     if masked {
         let smooth = moments.clone();
         // all points with few samples first; only where they disagree is the pair worth the rest. A point must not
         // decide for itself: stopping when its first samples agree would bias the mask towards 0 and 1.
-        mask_samples = settings.samples.min(FIRST_SAMPLES);
+        // For the same reason the last look takes all samples at once: pairs of which nothing was seen are never refined.
+        mask_samples = if settings.thorough { settings.samples } else { settings.samples.min(FIRST_SAMPLES) };
         seen = MaskSums::take(&pair, &places, shooter_basis, &mut moments, mask_samples, key);
         if seen.is_mixed() && settings.samples > mask_samples {
             moments = smooth;
             mask_samples = settings.samples;
             seen = MaskSums::take(&pair, &places, shooter_basis, &mut moments, mask_samples, key);
         }
-        let correction = seen.correction();
+    } else if settings.thorough {
+        for x in &places {
+            let Detail { actual, projected } = pair.detail(*x, shooter_basis);
+            seen.actual += actual;
+            seen.projected += projected;
+        }
+    }
+    let correction = seen.correction();
+    if correction != 1.0 {
         moments.iter_mut().for_each(|m| *m *= correction);
     }
 
@@ -112,6 +125,9 @@ pub fn couple<K: Kernel>(
         let n = seen.points * mask_samples as f64;
         let p = ((seen.open / seen.smooth) * n + 0.5) / (n + 1.0);
         (p * (1.0 - p) / n).sqrt() * seen.smooth / seen.points
+    } else if nothing {
+        // all samples fell where the kernel is zero; they stand for all but one in that many
+        pair.largest() / places.len() as f64
     } else {
         0.0
     };
@@ -170,8 +186,8 @@ impl MaskSums {
                 sums.open += mask.mean * whole;
                 sums.smooth += whole;
                 sums.spread += whole * (mask.mean * (1.0 - mask.mean)).max(0.0).sqrt();
-                sums.actual += mask.actual;
-                sums.projected += mask.projected;
+                sums.actual += mask.detail.actual;
+                sums.projected += mask.detail.projected;
                 sums.points += 1.0;
             }
         }

@@ -38,7 +38,18 @@ pub trait Pair {
 
     /// Turns the moments seen from x into masked moments, by about `samples` samples of the mask drawn from `key`.
     fn mask(&self, _x: [f64; 2], _basis: &CellBasis, _moments: &mut [f64], _samples: usize, _key: u64) -> Masked {
-        Masked { mean: 1.0, actual: 0.0, projected: 0.0 }
+        Masked { mean: 1.0, detail: Detail::default() }
+    }
+
+    /// About the largest integral of K(x, y) dy over the shooter, for any x of the receiver: what may have been missed where
+    /// every sample is 0 although the kernel is not certain to be.
+    fn largest(&self) -> f64 {
+        0.0
+    }
+
+    /// What arrives at x from the shooter's present function and from its projection, unmasked; zeros where unknown.
+    fn detail(&self, _x: [f64; 2], _basis: &CellBasis) -> Detail {
+        Detail::default()
     }
 }
 
@@ -47,10 +58,19 @@ pub trait Pair {
 pub struct Masked {
     /// Mean of the mask over the shooter, weighted with the kernel.
     pub mean: f64,
-    /// Masked kernel times what the shooter shoots at present, where the kernel knows it; else 0.
+    /// What arrives through the mask.
+    pub detail: Detail,
+}
+
+/// What arrives from a shooter as it shoots at present, where the kernel knows that; else zeros.
+///
+/// The ratio corrects a block for detail of the shooter that goes with kernel or mask: what is hidden from here is often
+/// what is dark, and blocks that only know the shooter's own coefficients lose light by it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Detail {
+    /// From the shooter's function in all its detail.
     pub actual: f64,
-    /// The same with the shooter's projection on its own cell's basis. The ratio of both corrects the block for detail
-    /// that goes with the mask: what is hidden from here is often what is dark.
+    /// From the function's projection on the basis of the shooter's own cell.
     pub projected: f64,
 }
 

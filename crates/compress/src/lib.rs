@@ -25,6 +25,6 @@ pub use cell::Cell;
 pub use couple::{CoupleSettings, Coupling, couple};
 pub use estimate::{Estimate, Magnitudes};
 pub use forest::{Forest, NodeId};
-pub use kernel::{Kernel, Masked, Pair};
+pub use kernel::{Detail, Kernel, Masked, Pair};
 pub use links::{Link, Links};
 pub use refine::{End, Refinement, Task};

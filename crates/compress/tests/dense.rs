@@ -9,7 +9,7 @@ fn smooth(x: f64, y: f64) -> f64 {
     1.0 / (1.5 + x - y)
 }
 
-const FULL: CoupleSettings = CoupleSettings { negligible: 0.0, samples: 0 };
+const FULL: CoupleSettings = CoupleSettings { negligible: 0.0, samples: 0, thorough: false };
 
 /// Links between the leaves of uniform trees of the given depth: every pair coupled at the finest level.
 fn uniform<F: Fn(u32, [f64; 2], u32, [f64; 2]) -> f64 + Sync>(

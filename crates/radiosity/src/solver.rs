@@ -11,7 +11,7 @@ use crate::rgb::Rgb;
 use crate::scene::Scene;
 use crate::settings::Settings;
 use crate::solution::{Solution, Statistics};
-use ondelette_compress::{CoupleSettings, End, Estimate, Forest, Links, Magnitudes, Refinement, Task, transport};
+use ondelette_compress::{CoupleSettings, End, Estimate, Forest, Link, Links, Magnitudes, Refinement, Task, transport};
 use ondelette_numerics::krylov::Gmres;
 use std::sync::Arc;
 
@@ -123,6 +123,8 @@ const PAIRS_A_STEP: usize = 128;
 const COARSE_RAYS: usize = 16;
 /// Most rays of a receiver point.
 const MOST_RAYS: usize = 1024;
+/// Fewest rays of a receiver point in the last look at a masked pair.
+const LEAST_LAST_RAYS: usize = 32;
 /// Krylov vectors kept before a restart.
 const RESTART: usize = 60;
 /// Deepest split.
@@ -369,7 +371,7 @@ impl Solver {
             let share = f64::from(link.strength) * shot / unit;
             let samples = rays_for(share, self.settings.error, 4);
             let negligible = if shot > 0.0 { 0.003 * self.settings.error * unit / shot } else { 0.0 };
-            CoupleSettings { negligible, samples }
+            CoupleSettings { negligible, samples, thorough: false }
         };
         // the first time good enough: renew; then tighten; then done, even where renewing moved the estimate a little
         let slack = if self.renewed { 1.02 } else { 1.0 };
@@ -378,7 +380,11 @@ impl Solver {
                 self.renewed = true;
                 let chosen = self.worth_renewing(&magnitudes);
                 if !chosen.is_empty() {
-                    self.phase = Phase::Renewing(Refinement::renewing(&self.links, &chosen, settings));
+                    let thorough = |k: u32| {
+                        let usual = settings(k);
+                        CoupleSettings { samples: usual.samples.max(LEAST_LAST_RAYS), thorough: true, ..usual }
+                    };
+                    self.phase = Phase::Renewing(Refinement::renewing(&self.links, &chosen, thorough));
                     return event;
                 }
             }
@@ -420,15 +426,15 @@ impl Solver {
         self.kernel.set_present(self.forest.clone(), values);
     }
 
-    /// The masked links whose shooters have detail: those that make up nearly all of what detail and mask do together.
+    /// The links that deserve a last look: those that make up nearly all of what detail and mask do together, and those
+    /// of which the first few rays saw nothing, which no refinement would ever look at again.
     fn worth_renewing(&self, magnitudes: &Magnitudes<3>) -> Vec<u32> {
-        let stakes: Vec<f64> = self
-            .links
-            .as_slice()
+        let links = self.links.as_slice();
+        let stakes: Vec<f64> = links
             .iter()
             .map(|l| {
                 let detail: f64 = magnitudes.detail[l.shooter.index()].iter().sum();
-                self.forest.node(l.receiver).measure * f64::from(l.spread) * detail
+                self.forest.node(l.receiver).measure * f64::from(l.spread + l.roughness) * detail
             })
             .collect();
         let whole: f64 = stakes.iter().sum();
@@ -441,7 +447,10 @@ impl Solver {
             before < 0.98 * whole
         });
         let mut chosen: Vec<u32> = enough.copied().collect();
+        let unseen = |l: &Link| l.masked && l.strength == 0.0 && l.unseen > 0.0;
+        chosen.extend((0..links.len() as u32).filter(|&k| unseen(&links[k as usize])));
         chosen.sort_unstable();
+        chosen.dedup();
         chosen
     }
 
@@ -498,7 +507,8 @@ impl Guess {
         let middle = |f: &SideFrame| f.origin + (f.edges[0] + f.edges[1]) * 0.5;
         let spread = std::f64::consts::PI * middle(r).distance_squared(middle(s));
         let share = s.area / (spread + s.area) * shot / self.irradiance;
-        CoupleSettings { negligible: 0.0, samples: rays_for(share, self.error, 1).min(COARSE_RAYS) }
+        let samples = rays_for(share, self.error, 1).min(COARSE_RAYS);
+        CoupleSettings { negligible: 0.0, samples, thorough: false }
     }
 }
 

@@ -204,7 +204,7 @@ impl Kernel for LightKernel {
             return None;
         }
         let masked = !candidates.is_empty();
-        let node = if masked { self.present.as_ref().and_then(|p| p.inner_node(shooter)) } else { None };
+        let node = self.present.as_ref().and_then(|p| p.inner_node(shooter));
         Some(LightPair { kernel: self, receiver: r, shooter: s, cell: *shooter, node, patches, masked })
     }
 }

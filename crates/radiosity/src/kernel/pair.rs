@@ -2,8 +2,9 @@
 
 use super::piece::pieces;
 use super::{Element, LightKernel, MOST_FUNCTIONS, density, sequence};
+use crate::form_factor::point_to_polygon;
 use glam::DVec3;
-use ondelette_compress::{Cell, Masked, NodeId, Pair};
+use ondelette_compress::{Cell, Detail, Masked, NodeId, Pair};
 use ondelette_numerics::seed;
 use ondelette_wavelet::cell::CellBasis;
 use std::sync::atomic::Ordering;
@@ -42,6 +43,19 @@ impl Pair for LightPair<'_> {
         }
     }
 
+    fn largest(&self) -> f64 {
+        // at the corners, drawn in a little: a corner may touch the shooter
+        let centre = self.receiver.ball().0;
+        let n = self.receiver.normal;
+        let corners = self.receiver.polygon();
+        let at = |c: &DVec3| {
+            let x = *c + (centre - *c) * 0.02;
+            let in_front = self.shooter.normal.dot(x - self.shooter.origin) > 0.0;
+            if in_front { point_to_polygon(x, n, &self.shooter.polygon().clipped(x, n)) } else { 0.0 }
+        };
+        corners.corners().iter().map(at).fold(0.0, f64::max)
+    }
+
     fn is_masked(&self) -> bool {
         self.masked
     }
@@ -60,7 +74,34 @@ impl Pair for LightPair<'_> {
             }
         }
         let scale = if seen.whole > 0.0 { unmasked / seen.whole } else { 0.0 };
-        Masked { mean: mask, actual: scale * seen.actual, projected: scale * seen.projected }
+        let detail = Detail { actual: scale * seen.actual, projected: scale * seen.projected };
+        Masked { mean: mask, detail }
+    }
+
+    fn detail(&self, x: [f64; 2], basis: &CellBasis) -> Detail {
+        let mut detail = Detail::default();
+        let (Some(node), Some(present)) = (self.node, &self.kernel.present) else { return detail };
+        let (from, n) = (self.receiver.point(x), self.receiver.normal);
+        if self.shooter.normal.dot(from - self.shooter.origin) <= 0.0 {
+            return detail;
+        }
+        let rule = basis.analysis(basis.order() + 1);
+        let weight = 1.0 / rule.points.len() as f64;
+        pieces(from, n, &self.shooter, &mut |piece| {
+            let (mut whole, mut actual, mut projected) = (0.0, 0.0, 0.0);
+            for y in &rule.points {
+                let y = piece.to_source(*y);
+                let k = weight * density(from, n, self.shooter.point(y), self.shooter.normal);
+                whole += k;
+                actual += k * present.at(self.cell.root, self.cell.to_root(y));
+                projected += k * present.value(node, y);
+            }
+            if whole > 0.0 {
+                detail.actual += piece.exact / whole * actual;
+                detail.projected += piece.exact / whole * projected;
+            }
+        });
+        detail
     }
 }
 
