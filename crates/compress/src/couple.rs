@@ -41,8 +41,6 @@ pub struct Coupling {
     pub masked: bool,
     /// Samples of the kernel taken.
     pub kernel_samples: u32,
-    /// Samples of the mask taken at most.
-    pub mask_points: u32,
 }
 
 /// Couples a receiver with a shooter; `None` where the kernel is certainly zero.
@@ -108,6 +106,9 @@ pub fn couple<K: Kernel>(
         }
     }
 
+    // what is dropped is dropped before the block is put to the test
+    let orders = truncate(&mut block, receiver_basis, shooter_basis, settings.negligible);
+
     // the block's answer to a shooter of constant value 1
     let constant: Vec<f64> = (0..nr).map(|i| total(shooter_basis, &block[i * ns..(i + 1) * ns])).collect();
     let strength = receiver_basis.mean(&constant, 0.0, |a, b, k| a + b * k);
@@ -134,9 +135,12 @@ pub fn couple<K: Kernel>(
     // detail of the shooter meets the misfit of K, and the mask's own variation over the shooter
     let spread = seen.spread / places.len() as f64;
     let roughness = roughness(&pair, receiver, shooter, shooter_basis) * strength;
-    let mut coupling = Coupling {
-        block,
-        orders: [receiver_basis.order() as u8, shooter_basis.order() as u8],
+    let rows = receiver_basis.truncated(usize::from(orders[0]));
+    let columns = shooter_basis.truncated(usize::from(orders[1]));
+    let entry = |(i, j): (u16, u16)| block[usize::from(i) * ns + usize::from(j)];
+    Some(Coupling {
+        block: rows.iter().flat_map(|&i| columns.iter().map(move |&j| (i, j))).map(entry).collect(),
+        orders,
         strength,
         residual,
         roughness,
@@ -144,10 +148,7 @@ pub fn couple<K: Kernel>(
         unseen,
         masked,
         kernel_samples: (places.len() * ns) as u32,
-        mask_points: if masked { places.len() as u32 } else { 0 },
-    };
-    truncate(&mut coupling, receiver_basis, shooter_basis, settings.negligible);
-    Some(coupling)
+    })
 }
 
 /// Mask samples of a point that decide whether a pair needs more.
@@ -236,38 +237,27 @@ fn roughness<P: Pair>(pair: &P, receiver: &Cell, shooter: &Cell, basis: &CellBas
     (misfit / mean.abs()).min(10.0)
 }
 
-/// Drops the orders that do not matter at either end.
-fn truncate(c: &mut Coupling, receiver: &CellBasis, shooter: &CellBasis, negligible: f64) {
-    let (nr, ns) = (receiver.len(), shooter.len());
-    let size = |rows: &[u16], columns: &[u16], block: &[f64]| {
-        // sum of what is left when the kept part is removed
-        let kept = |list: &[u16], i: usize| list.contains(&(i as u16));
-        let mut dropped = 0.0;
-        for i in 0..nr {
-            for j in 0..ns {
-                if !(kept(rows, i) && kept(columns, j)) {
-                    dropped += block[i * ns + j].abs();
-                }
-            }
-        }
-        dropped
+/// Sets to zero what belongs to orders that do not matter, and says which orders are left at either end.
+fn truncate(block: &mut [f64], receiver: &CellBasis, shooter: &CellBasis, negligible: f64) -> [u8; 2] {
+    let ns = shooter.len();
+    let kept = |rows: &[u16], columns: &[u16], k: usize| {
+        rows.contains(&((k / ns) as u16)) && columns.contains(&((k % ns) as u16))
     };
-    let orders = |basis: &CellBasis| if basis.is_nested() { 1..=basis.order() } else { basis.order()..=basis.order() };
-    let full_columns: Vec<u16> = (0..ns as u16).collect();
-    let p = orders(receiver)
-        .find(|&p| p == receiver.order() || size(receiver.truncated(p), &full_columns, &c.block) <= negligible)
-        .unwrap_or(receiver.order());
+    let dropped = |block: &[f64], rows: &[u16], columns: &[u16]| -> f64 {
+        (0..block.len()).filter(|&k| !kept(rows, columns, k)).map(|k| block[k].abs()).sum()
+    };
+    let lowest = |basis: &CellBasis| if basis.is_nested() { 1 } else { basis.order() };
+    let all = shooter.truncated(shooter.order());
+    let small = |p: &usize| dropped(block, receiver.truncated(*p), all) <= negligible;
+    let p = (lowest(receiver)..receiver.order()).find(small).unwrap_or(receiver.order());
     let rows = receiver.truncated(p);
-    let q = orders(shooter)
-        .find(|&q| q == shooter.order() || size(rows, shooter.truncated(q), &c.block) <= negligible)
-        .unwrap_or(shooter.order());
+    let small = |q: &usize| dropped(block, rows, shooter.truncated(*q)) <= negligible;
+    let q = (lowest(shooter)..shooter.order()).find(small).unwrap_or(shooter.order());
     let columns = shooter.truncated(q);
-    if rows.len() < nr || columns.len() < ns {
-        c.block = rows
-            .iter()
-            .flat_map(|&i| columns.iter().map(move |&j| (i, j)))
-            .map(|(i, j)| c.block[i as usize * ns + j as usize])
-            .collect();
-        c.orders = [p as u8, q as u8];
+    for k in 0..block.len() {
+        if !kept(rows, columns, k) {
+            block[k] = 0.0;
+        }
     }
+    [p as u8, q as u8]
 }

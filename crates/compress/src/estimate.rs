@@ -32,11 +32,11 @@ impl<const C: usize> Magnitudes<C> {
             let basis = forest.basis_of(id);
             let own = &values[n * stride..n * stride + basis.len()];
             mean[n] = basis.mean(own, [0.0; C], |a, b, k| std::array::from_fn(|c| a[c] + k * b[c]));
-            let scale = if basis.is_nested() { 1.0 } else { 1.0 / basis.len() as f64 };
-            let norm: [f64; C] = std::array::from_fn(|c| scale * own.iter().map(|v| v[c] * v[c]).sum::<f64>());
             if forest.is_leaf(id) {
-                square[n] = norm;
+                let scale = if basis.is_nested() { 1.0 } else { 1.0 / basis.len() as f64 };
+                square[n] = std::array::from_fn(|c| scale * own.iter().map(|v| v[c] * v[c]).sum::<f64>());
             } else {
+                let norm: [f64; C] = std::array::from_fn(|c| basis.projected_square(own.iter().map(|v| v[c])));
                 let arity = basis.shape().arity();
                 for k in 0..arity {
                     let child = forest.child(id, k).index();
@@ -58,8 +58,8 @@ impl<const C: usize> Magnitudes<C> {
 pub struct Estimate<const C: usize> {
     /// Integral over all receivers of the absolute error, channels summed.
     pub total: f64,
-    /// Integral of the signed error a channel: what would be carried on as a bias.
-    pub bias: [f64; C],
+    /// Mean signed error of each node (of leaves; inner nodes 0): what the operator would carry on as a bias.
+    pub bias: Vec<[f64; C]>,
     /// Share of [`Estimate::total`] that refining each link addresses, by link index.
     pub gains: Vec<f32>,
     /// Which end of each link to split.
@@ -74,8 +74,8 @@ struct Misses<const C: usize> {
 }
 
 impl<const C: usize> Estimate<C> {
-    /// Estimates the error. Cost linear in links and nodes.
-    pub fn of(forest: &Forest, links: &Links, magnitudes: &Magnitudes<C>) -> Self {
+    /// Estimates the error over the roots that `counts` says. Cost linear in links and nodes.
+    pub fn of(forest: &Forest, links: &Links, magnitudes: &Magnitudes<C>, counts: impl Fn(u32) -> bool + Sync) -> Self {
         let zero = Misses { signed: [[0.0; C]; CHILDREN], square: [0.0; C], absolute: [0.0; CHILDREN] };
         // what each node's own links miss
         let mut misses: Vec<Misses<C>> = par::map(forest.len(), |n| {
@@ -124,17 +124,20 @@ impl<const C: usize> Estimate<C> {
         let mut error = vec![0.0; forest.len()];
         let mut absolute = vec![0.0; forest.len()];
         let mut total = 0.0;
-        let mut bias = [0.0; C];
+        let mut bias = vec![[0.0; C]; forest.len()];
         for n in (0..forest.len()).rev() {
             let node = &forest.nodes()[n];
             let arity = node.cell.shape.arity();
+            if !counts(node.cell.root) {
+                continue;
+            }
             if node.first_child == 0 {
                 let m = &misses[n];
                 let weight = node.measure / arity as f64;
                 for q in 0..arity {
                     for c in 0..C {
                         error[n] += weight * (m.signed[q][c] * m.signed[q][c] + m.square[c]).sqrt();
-                        bias[c] += weight * m.signed[q][c];
+                        bias[n][c] += m.signed[q][c] / arity as f64;
                     }
                     absolute[n] += weight * m.absolute[q];
                 }
@@ -174,10 +177,11 @@ impl<const C: usize> Estimate<C> {
         Estimate { total, bias, gains, ends }
     }
 
-    /// The links with the largest gains that together address `wanted`, at most `most` of them; ties to the lower
+    /// The links that `may` be split with the largest gains, which together address `wanted`, at most `most` of them; ties to the lower
     /// index.
-    pub fn largest(&self, wanted: f64, most: usize) -> Vec<u32> {
-        let mut order: Vec<u32> = (0..self.gains.len() as u32).filter(|&k| self.gains[k as usize] > 0.0).collect();
+    pub fn largest(&self, wanted: f64, most: usize, may: impl Fn(u32) -> bool) -> Vec<u32> {
+        let worth = |&k: &u32| self.gains[k as usize] > 0.0 && may(k);
+        let mut order: Vec<u32> = (0..self.gains.len() as u32).filter(worth).collect();
         order.sort_by(|&a, &b| self.gains[b as usize].total_cmp(&self.gains[a as usize]).then(a.cmp(&b)));
         let mut sum = 0.0;
         let mut chosen = Vec::new();

@@ -38,14 +38,16 @@ impl Task {
 #[derive(Clone, Debug, Default)]
 pub struct Refinement {
     tasks: Vec<Task>,
-    done: Vec<Option<Coupling>>,
+    /// How many tasks are done, and what came of those that made a link.
+    done: usize,
+    made: Vec<(u32, Coupling)>,
     removed: Vec<u32>,
 }
 
 impl Refinement {
     /// A batch that couples the given pairs.
     pub fn linking(tasks: Vec<Task>) -> Self {
-        Refinement { tasks, done: Vec::new(), removed: Vec::new() }
+        Refinement { tasks, done: 0, made: Vec::new(), removed: Vec::new() }
     }
 
     /// A batch that splits the chosen links (by index) at the chosen ends.
@@ -70,7 +72,7 @@ impl Refinement {
                 });
             }
         }
-        Refinement { tasks, done: Vec::new(), removed: chosen.iter().map(|c| c.0).collect() }
+        Refinement { tasks, done: 0, made: Vec::new(), removed: chosen.iter().map(|c| c.0).collect() }
     }
 
     /// A batch that couples the chosen links (by index) anew, as they are.
@@ -79,7 +81,7 @@ impl Refinement {
             let link = links.as_slice()[k as usize];
             Task::between(link.receiver, link.shooter, settings(k))
         };
-        Refinement { tasks: chosen.iter().map(task).collect(), done: Vec::new(), removed: chosen.to_vec() }
+        Refinement { tasks: chosen.iter().map(task).collect(), done: 0, made: Vec::new(), removed: chosen.to_vec() }
     }
 
     /// Number of tasks.
@@ -94,14 +96,20 @@ impl Refinement {
 
     /// Number of tasks done.
     pub fn done(&self) -> usize {
-        self.done.len()
+        self.done
     }
 
-    /// Does the next `most` tasks, in parallel; true when all are done. Returns also (kernel samples, mask points)
-    /// taken.
-    pub fn step<K: Kernel>(&mut self, kernel: &K, forest: &Forest, most: usize) -> (bool, u64, u64) {
-        let from = self.done.len();
-        let count = most.min(self.tasks.len() - from);
+    /// Does the next tasks, in parallel, up to about `most` units of work (a unit is a few ten microseconds); true when
+    /// all are done. Returns also the kernel samples taken. How the work is cut changes no result.
+    pub fn step<K: Kernel>(&mut self, kernel: &K, forest: &Forest, most: usize) -> (bool, u64) {
+        let from = self.done;
+        let (mut count, mut work) = (0, 0);
+        while work < most && from + count < self.tasks.len() {
+            let task = &self.tasks[from + count];
+            let order = forest.basis_of(task.receiver.0).order();
+            work += order.pow(4) / 4 + task.settings.samples * (order + 2).pow(2) / 64 + 1;
+            count += 1;
+        }
         let cell = |(id, child): (NodeId, Option<u8>)| -> Cell {
             let cell = forest.node(id).cell;
             child.map_or(cell, |c| cell.child(usize::from(c)))
@@ -113,9 +121,10 @@ impl Refinement {
             couple(kernel, &r, forest.basis(r.shape), &s, forest.basis(s.shape), task.settings)
         });
         let samples = fresh.iter().flatten().map(|c| u64::from(c.kernel_samples)).sum();
-        let masks = fresh.iter().flatten().map(|c| u64::from(c.mask_points)).sum();
-        self.done.extend(fresh);
-        (self.done.len() == self.tasks.len(), samples, masks)
+        let made = fresh.into_iter().enumerate().filter_map(|(i, c)| c.map(|c| ((from + i) as u32, c)));
+        self.made.extend(made);
+        self.done += count;
+        (self.done == self.tasks.len(), samples)
     }
 
     /// Applies the batch: splits nodes, removes the old links, adds the new ones. Returns the nodes that were split, in
@@ -124,7 +133,7 @@ impl Refinement {
     /// # Panics
     /// If tasks are left to do.
     pub fn commit(self, forest: &mut Forest, links: &mut Links) -> Vec<NodeId> {
-        assert_eq!(self.done.len(), self.tasks.len(), "all tasks are done before a batch is committed");
+        assert_eq!(self.done, self.tasks.len(), "all tasks are done before a batch is committed");
         let mut split = Vec::new();
         let mut resolve = |forest: &mut Forest, (id, child): (NodeId, Option<u8>)| match child {
             None => id,
@@ -136,11 +145,13 @@ impl Refinement {
                 forest.child(id, usize::from(c))
             }
         };
-        let mut added = Vec::with_capacity(self.done.len());
-        for (task, coupling) in self.tasks.iter().zip(self.done) {
+        let mut added = Vec::with_capacity(self.made.len());
+        let mut made = self.made.into_iter().peekable();
+        for (k, task) in self.tasks.iter().enumerate() {
+            // children are made for every task, whether it became a link or not: the tree must not depend on blocks
             let receiver = resolve(forest, task.receiver);
             let shooter = resolve(forest, task.shooter);
-            if let Some(coupling) = coupling {
+            if let Some((_, coupling)) = made.next_if(|(index, _)| *index as usize == k) {
                 added.push((receiver, shooter, coupling));
             }
         }

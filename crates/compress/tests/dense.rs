@@ -31,7 +31,7 @@ fn uniform<F: Fn(u32, [f64; 2], u32, [f64; 2]) -> f64 + Sync>(
     }
     let tasks = level.iter().flat_map(|&r| level.iter().map(move |&s| Task::between(r, s, FULL))).collect();
     let mut batch = Refinement::linking(tasks);
-    while !batch.step(kernel, forest, 100).0 {}
+    while !batch.step(kernel, forest, 1000).0 {}
     batch.commit(forest, &mut links);
     links
 }
@@ -48,7 +48,7 @@ fn layered<F: Fn(u32, [f64; 2], u32, [f64; 2]) -> f64 + Sync>(
     let root = forest.roots()[0];
     let mut batch = Refinement::linking(vec![Task::between(root, root, FULL)]);
     loop {
-        while !batch.step(kernel, forest, 64).0 {}
+        while !batch.step(kernel, forest, 640).0 {}
         batch.commit(forest, &mut links);
         let chosen: Vec<(u32, End)> = links
             .as_slice()
@@ -115,7 +115,7 @@ fn a_polynomial_kernel_gives_the_same_answer_whatever_level_carries_the_links() 
 
         // one link at the root, over the same leaves
         let mut batch = Refinement::linking(vec![Task::between(fine.roots()[0], fine.roots()[0], FULL)]);
-        while !batch.step(&kernel, &fine, 8).0 {}
+        while !batch.step(&kernel, &fine, 80).0 {}
         let mut coarse = Links::new();
         batch.commit(&mut fine, &mut coarse);
         let got = apply_leaves(&fine, &coarse, &b);
@@ -226,7 +226,7 @@ fn a_batch_that_is_given_up_changes_nothing() {
     let root = forest.add_root(CellShape::Interval, 1.0);
     let mut links = Links::new();
     let mut first = Refinement::linking(vec![Task::between(root, root, FULL)]);
-    while !first.step(&kernel, &forest, 8).0 {}
+    while !first.step(&kernel, &forest, 80).0 {}
     first.commit(&mut forest, &mut links);
     let mut second = Refinement::splitting(&forest, &links, &[(0, End::Receiver)], |_| FULL);
     second.step(&kernel, &forest, 1);

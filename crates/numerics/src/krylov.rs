@@ -69,6 +69,7 @@ impl<const C: usize> Gmres<C> {
     /// Takes A times [`Gmres::direction`].
     pub fn supply(&mut self, mut product: Vec<[f64; C]>) {
         let k = self.factor.len();
+        let before = dot(&self.weights, &product, &product).map(f64::sqrt);
         let mut column = vec![[0.0; C]; k + 2];
         // modified Gram-Schmidt, twice
         for _ in 0..2 {
@@ -84,7 +85,13 @@ impl<const C: usize> Gmres<C> {
                 }
             }
         }
-        let norm = dot(&self.weights, &product, &product).map(f64::sqrt);
+        let mut norm = dot(&self.weights, &product, &product).map(f64::sqrt);
+        for c in 0..C {
+            // what is left is rounding: this channel's Krylov space is exhausted
+            if norm[c] <= EXHAUSTED * before[c] {
+                norm[c] = 0.0;
+            }
+        }
         column[k + 1] = norm;
         let mut rotation = [(1.0, 0.0); C];
         let mut next = [0.0; C];
@@ -125,7 +132,8 @@ impl<const C: usize> Gmres<C> {
                     sum -= self.factor[j][i][c] * y[j][c];
                 }
                 let pivot = self.factor[i][i][c];
-                y[i][c] = if pivot > 0.0 { sum / pivot } else { 0.0 };
+                let largest = self.factor[..n].iter().enumerate().map(|(j, f)| f[j][c]).fold(0.0, f64::max);
+                y[i][c] = if pivot > EXHAUSTED * largest { sum / pivot } else { 0.0 };
             }
         }
         let mut x = self.start.clone();
@@ -139,6 +147,9 @@ impl<const C: usize> Gmres<C> {
         x
     }
 }
+
+/// A vector that orthogonalisation has shrunk by this factor is rounding noise.
+const EXHAUSTED: f64 = 1e-13;
 
 fn dot<const C: usize>(w: &[f64], a: &[[f64; C]], b: &[[f64; C]]) -> [f64; C] {
     let mut sum = [0.0; C];
@@ -183,6 +194,29 @@ mod tests {
             assert!((x[0] - t[0]).abs() < 1e-9 && (x[1] - t[1]).abs() < 1e-9, "{x:?} {t:?}");
         }
         assert!(solver.residual().iter().all(|r| *r < 1e-9));
+    }
+
+    #[test]
+    fn a_channel_that_is_done_early_waits_for_the_other() {
+        // channel 0 is solved after one step (A = identity), channel 1 needs all of them
+        let n = 5;
+        let entry = |c: usize, i: usize, j: usize| match c {
+            0 => f64::from(u8::from(i == j)),
+            _ => f64::from(u8::from(i == j)) + 0.1 * ((3 * i + 5 * j) % 7) as f64,
+        };
+        let times = |v: &[[f64; 2]]| -> Vec<[f64; 2]> {
+            (0..n).map(|i| std::array::from_fn(|c| (0..n).map(|j| entry(c, i, j) * v[j][c]).sum())).collect()
+        };
+        let truth: Vec<[f64; 2]> = (0..n).map(|i| [i as f64 - 1.5, 2.0 - i as f64]).collect();
+        let mut solver = Gmres::new(vec![[0.0; 2]; n], times(&truth), vec![1.0; n]);
+        for _ in 0..3 * n {
+            let Some(direction) = solver.direction() else { break };
+            let product = times(direction);
+            solver.supply(product);
+        }
+        for (x, t) in solver.solution().iter().zip(&truth) {
+            assert!((x[0] - t[0]).abs() < 1e-9 && (x[1] - t[1]).abs() < 1e-9, "{x:?} {t:?}");
+        }
     }
 
     #[test]

@@ -88,6 +88,8 @@ pub struct Occluders {
 
 /// Segments end this share of their length before they reach what they aim at.
 const RELATIVE_EPSILON: f64 = 1e-6;
+/// Hits closer than this, in diagonals, are at the same place.
+const TIE: f64 = 1e-9;
 /// Margin of the boxes, in units of the scene's diagonal: above the rounding of f32 rays.
 const MARGIN: f32 = 1e-6;
 /// The wide hierarchy overlooks boxes that end before t = 1e-4, so its rays start this much earlier.
@@ -168,16 +170,22 @@ impl Occluders {
         let ray = self.ray(from, direction * stretch, f32::INFINITY);
         // where the ray starts is skipped by name, so this only has to beat rounding
         let least = 1e-11 * stretch;
-        let mut nearest: Option<(f64, u32)> = None;
+        let mut nearest: Option<(f64, bool, u32)> = None;
         let mut hit = RayHit::none();
         self.wide.ray_traverse(ray, &mut hit, |_, id| {
             let patch = self.wide.primitive_indices[id];
             let facet = &self.facets[patch as usize];
+            let front = facet.normal.dot(direction) < 0.0;
             match facet.crossing(from, direction) {
-                Some(t) if t > least && !skips(patch, facet.normal.dot(direction) < 0.0) => {
-                    // ties go to the lower index, whatever the order of traversal
-                    if nearest.is_none_or(|(best, at)| t < best || (t == best && patch < at)) {
-                        nearest = Some((t, patch));
+                Some(t) if t > least && !skips(patch, front) => {
+                    // of two faces back to back the one whose front is met counts, then the lower index, whatever the
+                    // order of traversal
+                    let better = |(best, best_front, at): (f64, bool, u32)| {
+                        let tie = (t - best).abs() <= TIE * stretch;
+                        if tie { (!front, patch) < (!best_front, at) } else { t < best }
+                    };
+                    if nearest.is_none_or(better) {
+                        nearest = Some((t, front, patch));
                     }
                     // a little farther than it is, so that rounding to f32 hides nothing in front of it
                     ((t / stretch + RUN_UP) * (1.0 + 1e-6)) as f32
@@ -185,11 +193,11 @@ impl Occluders {
                 _ => f32::INFINITY,
             }
         });
-        let (t, patch) = nearest?;
+        let (t, front, patch) = nearest?;
         let facet = &self.facets[patch as usize];
         let p = from + direction * t - facet.origin;
         let at = [facet.to_s.dot(p).clamp(0.0, 1.0), facet.to_t.dot(p).clamp(0.0, 1.0)];
-        Some(Hit { patch, t, at, front: facet.normal.dot(direction) < 0.0 })
+        Some(Hit { patch, t, at, front })
     }
 
     /// All patches whose boxes come within `radius` of a point, ascending.

@@ -107,6 +107,10 @@ pub struct Solver {
     phase: Phase,
     /// Whether the present solve goes to the final tolerance.
     strict: bool,
+    /// Area of the sides that the promise counts.
+    counted_area: f64,
+    /// Integral of the irradiance over counted sides, channels summed: what residuals are measured against.
+    whole: f64,
     /// Whether nothing is left to refine although the promise is not kept.
     stalled: bool,
     /// Whether the masked links were coupled anew since the last refinement.
@@ -116,17 +120,21 @@ pub struct Solver {
 }
 
 /// Sides up to which all pairs are linked.
-pub const MOST_SIDES: usize = 12_000;
-/// Pairs a step: a few milliseconds of work, a few tens at worst.
-const PAIRS_A_STEP: usize = 128;
+pub const MOST_SIDES: usize = 6_000;
+/// Work a step, in units of a few ten microseconds: some ten milliseconds in all.
+const WORK_A_STEP: usize = 1024;
 /// Rays of a receiver point in the first, coarse linking.
 const COARSE_RAYS: usize = 16;
 /// Most rays of a receiver point.
 const MOST_RAYS: usize = 1024;
 /// Fewest rays of a receiver point in the last look at a masked pair.
 const LEAST_LAST_RAYS: usize = 32;
+/// Share of the promise aimed at, so that the last look at the links does not break it.
+const AIM: f64 = 0.97;
 /// Krylov vectors kept before a restart.
 const RESTART: usize = 60;
+/// Sweeps that follow a bias through the scene.
+const CARRIED_SWEEPS: usize = 4;
 /// Deepest split.
 const DEEPEST: u32 = 16;
 
@@ -150,6 +158,8 @@ impl Solver {
             forest.add_root(side.shape, side.area);
         }
         let irradiance = vec![[0.0; 3]; forest.len() * forest.stride()];
+        let counted = scene.sides.iter().zip(kernel.sides()).filter(|(s, _)| !scene.material(**s).is_pure_emitter());
+        let counted_area = counted.map(|(_, frame)| frame.area).sum();
         let guess = Guess::of(&scene, &kernel, settings.error);
         let mut tasks = Vec::new();
         for (r, &receiver) in forest.roots().iter().enumerate() {
@@ -168,6 +178,8 @@ impl Solver {
             irradiance,
             phase: Phase::Linking(Refinement::linking(tasks)),
             strict: false,
+            counted_area,
+            whole: 0.0,
             stalled: false,
             renewed: false,
             error: f64::INFINITY,
@@ -180,7 +192,8 @@ impl Solver {
         &self.scene
     }
 
-    /// Does a bounded piece of work; `None` when the promise is kept.
+    /// Does a bounded piece of work; `None` when the promise is kept, or when nothing is left to refine
+    /// ([`Statistics::finished`] says which).
     pub fn step(&mut self) -> Option<Event> {
         match std::mem::replace(&mut self.phase, Phase::Finished) {
             Phase::Linking(batch) => {
@@ -225,7 +238,7 @@ impl Solver {
         event: impl Fn(usize, usize) -> Event,
         phase: impl Fn(Refinement) -> Phase,
     ) -> Event {
-        let (finished, samples, _) = batch.step(&self.kernel, &self.forest, PAIRS_A_STEP);
+        let (finished, samples) = batch.step(&self.kernel, &self.forest, WORK_A_STEP);
         self.statistics.kernel_samples += samples;
         self.statistics.rays = self.kernel.rays_cast();
         let event = event(batch.done(), batch.len());
@@ -281,15 +294,39 @@ impl Solver {
             }
         }
         let weights = self.slot_weights();
+        // E is at least what the present radiosity brings, and that is the residual plus E
+        let brought: f64 = self.leaf_sum(|slot| Rgb(residual[slot]) + Rgb(self.irradiance[slot]));
+        let known: f64 = self.leaf_sum(|slot| Rgb(self.irradiance[slot]));
+        self.whole = brought.max(known);
         self.phase = Phase::Solving(Box::new(Gmres::new(self.irradiance.clone(), residual, weights)));
     }
 
-    /// Weight of each coefficient in the area-weighted square mean: leaves only.
+    /// Integral over counted sides of a piecewise function, channels summed, from its coefficients.
+    fn leaf_sum(&self, coefficient: impl Fn(usize) -> Rgb) -> f64 {
+        let stride = self.forest.stride();
+        let mut sum = 0.0;
+        for (n, node) in self.forest.nodes().iter().enumerate() {
+            if node.first_child == 0 && self.counts(node.cell.root) {
+                let basis = self.forest.basis(node.cell.shape);
+                let constant = if basis.is_nested() { 1 } else { basis.len() };
+                let share = node.measure / constant as f64;
+                sum += (0..constant).map(|j| coefficient(n * stride + j).sum() * share).sum::<f64>();
+            }
+        }
+        sum
+    }
+
+    /// Whether the promise counts a side: pure emitters receive too, but nobody asked how much.
+    fn counts(&self, side: u32) -> bool {
+        !self.scene.material(self.scene.sides[side as usize]).is_pure_emitter()
+    }
+
+    /// Weight of each coefficient in the area-weighted square mean: leaves of counted sides only.
     fn slot_weights(&self) -> Vec<f64> {
         let stride = self.forest.stride();
         let mut weights = vec![0.0; self.forest.len() * stride];
         for (n, node) in self.forest.nodes().iter().enumerate() {
-            if node.first_child == 0 {
+            if node.first_child == 0 && self.counts(node.cell.root) {
                 let basis = self.forest.basis(node.cell.shape);
                 let share = if basis.is_nested() { node.measure } else { node.measure / basis.len() as f64 };
                 weights[n * stride..n * stride + basis.len()].fill(share);
@@ -300,25 +337,20 @@ impl Solver {
 
     fn sweep(&mut self, mut gmres: Box<Gmres<3>>) -> Event {
         // the residual a first, coarse balance needs, and the one that the promise needs
-        let highest = self.scene.materials.iter().map(|m| m.reflectance.max()).fold(0.0, f64::max);
+        let highest = self.highest_reflectance();
         let tolerance =
             if self.strict { self.settings.error } else { self.settings.error.max(0.3 * self.error.min(0.3)) };
         let wanted = 0.1 * tolerance * (1.0 - highest);
-        let scale = norm(&gmres.solution(), &self.slot_weights());
-        let residual = |g: &Gmres<3>, scale: f64| {
-            let r = g.residual().iter().map(|r| r * r).sum::<f64>().sqrt();
-            if scale > 0.0 {
-                r / scale
-            } else if r > 0.0 {
-                1.0
-            } else {
-                0.0
-            }
+        // by Cauchy and Schwarz the integral of |r| is at most the root of the area times the norm of r
+        let residual = |g: &Gmres<3>| {
+            let r = g.residual().iter().sum::<f64>() * self.counted_area.sqrt();
+            if self.whole > 0.0 { r / self.whole } else { 0.0 }
         };
-        let now = residual(&gmres, scale);
+        let now = residual(&gmres);
         let direction = if now <= wanted { None } else { gmres.direction() };
         let Some(direction) = direction else {
             self.irradiance = gmres.solution();
+            self.settle();
             self.statistics.residual = now;
             return self.judge();
         };
@@ -332,8 +364,7 @@ impl Solver {
         }
         gmres.supply(product);
         self.statistics.iterations += 1;
-        let event =
-            Event::Iterated { iterations: self.statistics.iterations, residual: residual(&gmres, scale), wanted };
+        let event = Event::Iterated { iterations: self.statistics.iterations, residual: residual(&gmres), wanted };
         if gmres.steps() >= RESTART {
             self.irradiance = gmres.solution();
             self.start_solving();
@@ -343,25 +374,50 @@ impl Solver {
         event
     }
 
+    /// One plain sweep at the end of a solve: sides that the norm leaves out get what the others send them.
+    fn settle(&mut self) {
+        let mut values = self.radiosity(&self.irradiance, true);
+        let mut result = vec![[0.0; 3]; values.len()];
+        transport::apply(&self.forest, &self.links, &mut values, &mut result);
+        self.irradiance = result;
+        self.statistics.iterations += 1;
+    }
+
+    /// What a signed error of the irradiance becomes by reflection: the integral of its absolute value over all further
+    /// bounces. A few sweeps, then a geometric tail.
+    fn carried(&self, bias: &[[f64; 3]]) -> f64 {
+        let stride = self.forest.stride();
+        let mut error = vec![[0.0; 3]; self.irradiance.len()];
+        for (n, node) in self.forest.nodes().iter().enumerate() {
+            let basis = self.forest.basis(node.cell.shape);
+            let constant = if basis.is_nested() { 1 } else { basis.len() };
+            error[n * stride..n * stride + constant].fill(bias[n]);
+        }
+        let size = |e: &[[f64; 3]]| self.leaf_sum(|slot| Rgb(e[slot].map(f64::abs)));
+        let (mut sum, mut last, mut ratio) = (0.0, size(&error), 0.0);
+        for _ in 0..CARRIED_SWEEPS {
+            let mut values = self.radiosity(&error, false);
+            transport::apply(&self.forest, &self.links, &mut values, &mut error);
+            let now = size(&error);
+            sum += now;
+            ratio = if last > 0.0 { (now / last).min(0.99) } else { 0.0 };
+            last = now;
+        }
+        sum + last * ratio / (1.0 - ratio)
+    }
+
     /// Estimates the error; finishes, tightens the solve, or starts the next batch of refinement.
     fn judge(&mut self) -> Event {
         let mut values = self.radiosity(&self.irradiance, true);
         transport::pull(&self.forest, &mut values);
         let magnitudes = Magnitudes::of(&self.forest, &values);
-        let estimate = Estimate::of(&self.forest, &self.links, &magnitudes);
-        let (mean, area) = self.mean_irradiance();
-        let whole = mean.sum() * area;
-        // a bias is carried on by every reflection, scatter is not
-        let carried = self.mean_reflectance();
-        let bias: f64 = (0..3).map(|c| carried.0[c] / (1.0 - carried.0[c]) * estimate.bias[c].abs()).sum();
-        let missed = estimate.total + bias;
-        self.error = if whole > 0.0 {
-            missed / whole
-        } else if missed > 0.0 {
-            f64::INFINITY
-        } else {
-            0.0
-        };
+        let estimate = Estimate::of(&self.forest, &self.links, &magnitudes, |root| self.counts(root));
+        let mean = self.mean_irradiance();
+        let whole = mean.sum() * self.counted_area;
+        // a bias is carried on by every reflection, scatter is not; and the equations are only solved so far
+        let unsolved = self.statistics.residual * whole / (1.0 - self.highest_reflectance());
+        let missed = estimate.total + self.carried(&estimate.bias) + unsolved;
+        self.error = if whole > 0.0 { missed / whole } else { 0.0 };
         let event = Event::Solved { error: self.error, links: self.links.len(), elements: self.forest.leaves() };
         self.know_present(&values);
         let unit = mean.sum();
@@ -373,9 +429,9 @@ impl Solver {
             let negligible = if shot > 0.0 { 0.003 * self.settings.error * unit / shot } else { 0.0 };
             CoupleSettings { negligible, samples, thorough: false }
         };
-        // the first time good enough: renew; then tighten; then done, even where renewing moved the estimate a little
-        let slack = if self.renewed { 1.02 } else { 1.0 };
-        if self.error <= slack * self.settings.error {
+        // the first time good enough, with a little to spare: renew; then tighten; then done
+        let enough = if self.renewed { 1.0 } else { AIM };
+        if self.error <= enough * self.settings.error {
             if !self.renewed {
                 self.renewed = true;
                 let chosen = self.worth_renewing(&magnitudes);
@@ -400,15 +456,15 @@ impl Solver {
         self.renewed = false;
         let target = self.settings.error * whole;
         let wanted = (estimate.total - 0.5 * target).min(0.6 * estimate.total).max(0.2 * estimate.total);
+        let may_split = |k: u32| {
+            let link = self.links.as_slice()[k as usize];
+            let id = if estimate.ends[k as usize] == End::Receiver { link.receiver } else { link.shooter };
+            self.forest.node(id).cell.depth < DEEPEST
+        };
         let chosen: Vec<(u32, End)> = estimate
-            .largest(wanted, (self.links.len() / 2).max(64))
+            .largest(wanted, (self.links.len() / 2).max(64), may_split)
             .into_iter()
             .map(|k| (k, estimate.ends[k as usize]))
-            .filter(|&(k, end)| {
-                let link = self.links.as_slice()[k as usize];
-                let id = if end == End::Receiver { link.receiver } else { link.shooter };
-                self.forest.node(id).cell.depth < DEEPEST
-            })
             .collect();
         if chosen.is_empty() {
             self.stalled = true;
@@ -454,31 +510,22 @@ impl Solver {
         chosen
     }
 
-    /// Area-weighted mean irradiance over the sides that the promise counts, and their area.
-    fn mean_irradiance(&self) -> (Rgb, f64) {
+    /// Area-weighted mean irradiance over the sides that the promise counts.
+    fn mean_irradiance(&self) -> Rgb {
         let stride = self.forest.stride();
-        let (mut sum, mut area) = (Rgb::BLACK, 0.0);
+        let mut sum = Rgb::BLACK;
         for (n, node) in self.forest.nodes().iter().enumerate() {
-            let material = self.scene.material(self.scene.sides[node.cell.root as usize]);
-            if node.first_child != 0 || material.is_pure_emitter() {
-                continue;
+            if node.first_child == 0 && self.counts(node.cell.root) {
+                let own = &self.irradiance[n * stride..(n + 1) * stride];
+                let basis = self.forest.basis(node.cell.shape);
+                sum += Rgb(basis.mean(own, [0.0; 3], |a, b, k| (Rgb(a) + Rgb(b) * k).0)) * node.measure;
             }
-            let own = &self.irradiance[n * stride..(n + 1) * stride];
-            let mean = self.forest.basis(node.cell.shape).mean(own, [0.0; 3], |a, b, k| (Rgb(a) + Rgb(b) * k).0);
-            sum += Rgb(mean) * node.measure;
-            area += node.measure;
         }
-        (if area > 0.0 { sum * (1.0 / area) } else { sum }, area)
+        if self.counted_area > 0.0 { sum * (1.0 / self.counted_area) } else { sum }
     }
 
-    /// Area-weighted mean reflectance.
-    fn mean_reflectance(&self) -> Rgb {
-        let (mut sum, mut area) = (Rgb::BLACK, 0.0);
-        for (side, frame) in self.scene.sides.iter().zip(self.kernel.sides()) {
-            sum += self.scene.material(*side).reflectance * frame.area;
-            area += frame.area;
-        }
-        sum * (1.0 / area)
+    fn highest_reflectance(&self) -> f64 {
+        self.scene.materials.iter().map(|m| m.reflectance.max()).fold(0.0, f64::max)
     }
 }
 
@@ -515,9 +562,6 @@ impl Guess {
 /// Rays for one receiver point of a link that brings this share of the mean irradiance: so many that their error, of
 /// some twenty such links together, stays below the promise (stratified rays err like n^-3/4).
 fn rays_for(share: f64, error: f64, least: usize) -> usize {
-    (4.0 * share / error).powf(4.0 / 3.0).clamp(least as f64, MOST_RAYS as f64) as usize
-}
-
-fn norm(values: &[[f64; 3]], weights: &[f64]) -> f64 {
-    values.iter().zip(weights).map(|(v, w)| w * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2])).sum::<f64>().sqrt()
+    let rays = (4.0 * share / error).powf(4.0 / 3.0);
+    if rays.is_nan() { least } else { rays.clamp(least as f64, MOST_RAYS as f64) as usize }
 }

@@ -164,6 +164,8 @@ pub struct CellBasis {
     index: Vec<[u8; 2]>,
     /// One n x n matrix a child, row-major, `T_c[parent][child]`.
     two_scale: Vec<Vec<f64>>,
+    /// Inverse Gram matrix of pulled flatlet coefficients; empty for orthonormal bases.
+    inverse_gram: Vec<f64>,
     /// `analyses[n - 1]`: the rule of [`CellBasis::analysis`].
     analyses: Vec<Analysis>,
     /// `truncated[p - 1]`: which functions make up the basis of order p.
@@ -206,10 +208,14 @@ impl CellBasis {
             fell_back,
             index,
             two_scale: Vec::new(),
+            inverse_gram: Vec::new(),
             analyses: Vec::new(),
             truncated: Vec::new(),
         };
         basis.two_scale = (0..shape.arity()).map(|c| basis.two_scale_matrix(c)).collect();
+        if !basis.is_nested() {
+            basis.inverse_gram = basis.make_inverse_gram();
+        }
         basis.analyses = (1..=Self::MAX_POINTS).map(|n| basis.make_analysis(n)).collect();
         basis.truncated = (1..=order)
             .map(|p| {
@@ -366,6 +372,19 @@ impl CellBasis {
         }
     }
 
+    /// Mean square of the projection that pulled coefficients stand for.
+    ///
+    /// Orthonormal bases: the sum of squares. Pulled flatlet coefficients are means against the dual staircases, so their
+    /// Gram matrix comes in (of the staircases one level down, where they differ most from boxes).
+    pub fn projected_square(&self, pulled: impl Iterator<Item = f64>) -> f64 {
+        if self.inverse_gram.is_empty() {
+            return pulled.map(|c| c * c).sum();
+        }
+        let c: Vec<f64> = pulled.collect();
+        let n = c.len();
+        (0..n).map(|i| c[i] * (0..n).map(|j| self.inverse_gram[i * n + j] * c[j]).sum::<f64>()).sum()
+    }
+
     /// Adds a parent's function to the coefficients of child `c`; `add(child, factor, parent)` does one term.
     pub fn push<C: Copy>(&self, c: usize, parent: &[C], child: &mut [C], add: impl Fn(&mut C, f64, C)) {
         let n = self.len();
@@ -387,6 +406,22 @@ impl CellBasis {
                 add(&mut parent[i], share * matrix[i * n + j], child[j]);
             }
         }
+    }
+
+    /// A pulled coefficient is the mean of the function times the staircase of height n T_c\[i\]\[k\] on box k of child c
+    /// (n boxes a cell); this inverts the Gram matrix n/arity sum_c T_c T_c^T of these staircases.
+    fn make_inverse_gram(&self) -> Vec<f64> {
+        let n = self.len();
+        let mut gram = vec![0.0; n * n];
+        for t in &self.two_scale {
+            for i in 0..n {
+                for j in 0..n {
+                    let dot: f64 = (0..n).map(|k| t[i * n + k] * t[j * n + k]).sum();
+                    gram[i * n + j] += dot * n as f64 / self.two_scale.len() as f64;
+                }
+            }
+        }
+        invert(&gram, n)
     }
 
     fn two_scale_matrix(&self, c: usize) -> Vec<f64> {
@@ -491,9 +526,49 @@ fn flatlet_axis(m: usize, half: usize) -> Vec<f64> {
     matrix
 }
 
+/// Inverse of a small, well conditioned symmetric matrix (Gauss-Jordan).
+fn invert(matrix: &[f64], n: usize) -> Vec<f64> {
+    let mut a = matrix.to_vec();
+    let mut inverse: Vec<f64> = (0..n * n).map(|k| if k / n == k % n { 1.0 } else { 0.0 }).collect();
+    for k in 0..n {
+        let pivot = 1.0 / a[k * n + k];
+        for j in 0..n {
+            a[k * n + j] *= pivot;
+            inverse[k * n + j] *= pivot;
+        }
+        for i in (0..n).filter(|&i| i != k) {
+            let factor = a[i * n + k];
+            for j in 0..n {
+                a[i * n + j] -= factor * a[k * n + j];
+                inverse[i * n + j] -= factor * inverse[k * n + j];
+            }
+        }
+    }
+    inverse
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_square_of_a_projection_is_that_of_what_the_basis_reproduces() {
+        // polynomials of degree < M, as box means of the children, are reproduced: their squares survive the pull
+        for order in 1..=4 {
+            let b = CellBasis::new(CellShape::Interval, CellFamily::Flatlet, order).unwrap();
+            let parent: Vec<f64> = (0..order).map(|i| 1.0 + (i as f64).powi(order as i32 - 1)).collect();
+            let mut pulled = vec![0.0; order];
+            let mut square = 0.0;
+            for c in 0..2 {
+                let mut child = vec![0.0; order];
+                b.push(c, &parent, &mut child, |a, k, p| *a += k * p);
+                square += child.iter().map(|v| v * v).sum::<f64>() / (2 * order) as f64;
+                b.pull(c, &child, &mut pulled, |a, k, p| *a += k * p);
+            }
+            let got = b.projected_square(pulled.into_iter());
+            assert!((got / square - 1.0).abs() < 1e-12, "order {order}: {got} instead of {square}");
+        }
+    }
 
     fn all() -> Vec<CellBasis> {
         let mut bases = Vec::new();
