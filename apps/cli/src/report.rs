@@ -50,7 +50,15 @@ impl Record<'_> {
     /// Whether the promise is kept.
     pub(crate) fn keeps_promise(&self) -> bool {
         let statistics = self.solution.statistics();
-        statistics.finished && statistics.estimated_error <= self.solution.settings().error
+        statistics.finished
+            && statistics.estimated_error <= self.solution.settings().error
+            && self.ledger.is_none_or(|l| self.closes(&l))
+    }
+
+    /// Whether the ledger closes as far as the promised error allows: more energy than that cannot go astray unless the
+    /// scene has something that the solver misjudges.
+    fn closes(&self, ledger: &Ledger) -> bool {
+        ledger.closure().abs() <= 0.01 + 2.0 * self.solution.settings().error
     }
 
     /// The report as JSON. Powers are in the unit of the scene's power, lengths in metres, times in seconds; what is
@@ -129,6 +137,9 @@ impl Record<'_> {
             let why = match self.stopped {
                 Some(Reason::Signal) => "stopped by Ctrl-C: this result is unfinished".to_owned(),
                 Some(Reason::Time) => "stopped by --max-time: this result is unfinished".to_owned(),
+                None if self.ledger.is_some_and(|l| !self.closes(&l)) => {
+                    "the energy ledger does not close: this result is not to be trusted".to_owned()
+                }
                 None => format!(
                     "the tolerance of {} % is missed: no element may be split further",
                     100.0 * solution.settings().error

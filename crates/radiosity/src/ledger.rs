@@ -91,6 +91,11 @@ impl Ledger {
                 let direction =
                     (tangent * angle.cos() + bitangent * angle.sin()) * sine + frame.normal * (1.0 - u[2]).sqrt();
                 let own = frame.patch;
+                if kernel.is_covered(side, from) {
+                    // what lies under another face shines on its back
+                    sums[0] += weight;
+                    continue;
+                }
                 let end = match kernel.occluders().first_hit(from, direction, |patch, _| patch == own) {
                     None => End::Away,
                     Some(hit) => {

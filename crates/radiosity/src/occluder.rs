@@ -178,11 +178,11 @@ impl Occluders {
             let front = facet.normal.dot(direction) < 0.0;
             match facet.crossing(from, direction) {
                 Some(t) if t > least && !skips(patch, front) => {
-                    // of two faces back to back the one whose front is met counts, then the lower index, whatever the
-                    // order of traversal
+                    // of two faces at the same place the one whose front is met counts, then the later one, which
+                    // covers the earlier, whatever the order of traversal
                     let better = |(best, best_front, at): (f64, bool, u32)| {
                         let tie = (t - best).abs() <= TIE * stretch;
-                        if tie { (!front, patch) < (!best_front, at) } else { t < best }
+                        if tie { (front, patch) > (best_front, at) } else { t < best }
                     };
                     if nearest.is_none_or(better) {
                         nearest = Some((t, front, patch));

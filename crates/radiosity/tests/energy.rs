@@ -90,6 +90,86 @@ fn light_that_meets_a_back_is_lost_there() {
     assert!(solution.mean_irradiance(0).0[0] < 1e-12);
 }
 
+/// A closed room of side 3 with its corner at x = 5, and a lamp under its ceiling.
+fn room(reflectance: f64) -> Vec<([[f64; 3]; 4], Rgb, Rgb)> {
+    let p = |i: u32| [5.0 + 3.0 * f64::from(i & 1), 3.0 * f64::from(i >> 1 & 1), 3.0 * f64::from(i >> 2 & 1)];
+    let walls = [[0, 1, 3, 2], [6, 7, 5, 4], [0, 2, 6, 4], [3, 1, 5, 7], [1, 0, 4, 5], [2, 3, 7, 6]];
+    let mut faces: Vec<_> = walls.iter().map(|w| (w.map(p), Rgb::grey(reflectance), Rgb::BLACK)).collect();
+    let lamp = [[6.0, 1.0, 2.5], [6.0, 2.0, 2.5], [7.0, 2.0, 2.5], [7.0, 1.0, 2.5]];
+    faces.push((lamp, Rgb::BLACK, Rgb::grey(1.0)));
+    faces
+}
+
+#[test]
+fn a_carpet_on_the_floor_receives_in_its_place_and_creates_no_light() {
+    let mut faces = room(0.6);
+    let carpet = [[5.3, 0.3, 0.0], [7.7, 0.3, 0.0], [7.7, 2.7, 0.0], [5.3, 2.7, 0.0]];
+    let plain = solve(samples::quads("room", &faces), "m2", 0.03);
+    faces.push((carpet, Rgb::grey(0.6), Rgb::BLACK));
+    let covered = solve(samples::quads("room with carpet", &faces), "m2", 0.03);
+    let ledger = Ledger::count(&covered, 1 << 16);
+    assert!(ledger.closure().abs() < 0.02, "{ledger:?}");
+    // under the carpet it is dark; on it, as on the bare floor
+    assert!(covered.irradiance(0, [0.5, 0.5]).0[0].abs() < 0.02 * plain.irradiance(0, [0.5, 0.5]).0[0]);
+    let (bare, on) = (plain.irradiance(0, [0.5, 0.5]).0[0], covered.irradiance(7, [0.5, 0.5]).0[0]);
+    assert!((on / bare - 1.0).abs() < 0.05, "{on} on the carpet, {bare} on the bare floor");
+}
+
+#[test]
+fn a_blazing_lamp_elsewhere_does_not_hide_an_unsolved_room() {
+    // a tiny closed cube of bright pure emitters: its huge irradiance must not stop the iteration early
+    let faces = room(0.8);
+    let alone = solve(samples::quads("room", &faces), "m2", 0.02);
+    let p = |i: u32| [0, 1, 2].map(|k| 20.0 + 0.01 * f64::from(i >> k & 1));
+    let walls = [[0, 1, 3, 2], [6, 7, 5, 4], [0, 2, 6, 4], [3, 1, 5, 7], [1, 0, 4, 5], [2, 3, 7, 6]];
+    let mut both = faces.clone();
+    both.extend(walls.iter().map(|w| (w.map(p), Rgb::BLACK, Rgb::grey(1e6))));
+    let together = solve(samples::quads("room and furnace", &both), "m2", 0.02);
+    for side in 0..6 {
+        let (a, b) = (alone.mean_irradiance(side).0[0], together.mean_irradiance(side).0[0]);
+        assert!((b / a - 1.0).abs() < 0.04, "side {side}: {b} beside the furnace, {a} alone");
+    }
+}
+
+#[test]
+fn a_far_black_floor_does_not_dilute_the_error() {
+    let lit = solve(samples::quads("room", &room(0.95)), "m2", 0.03);
+    let mut faces = room(0.95);
+    let far = [[100.0, 0.0, 0.0], [140.0, 0.0, 0.0], [140.0, 40.0, 0.0], [100.0, 40.0, 0.0]];
+    faces.push((far, Rgb::BLACK, Rgb::BLACK));
+    let diluted = solve(samples::quads("room and far floor", &faces), "m2", 0.03);
+    for side in 0..6 {
+        let (a, b) = (lit.mean_irradiance(side).0[0], diluted.mean_irradiance(side).0[0]);
+        assert!((b / a - 1.0).abs() < 0.06, "side {side}: {b} with the far floor, {a} without");
+    }
+}
+
+#[test]
+fn emitters_that_see_only_each_other_are_done_at_once() {
+    let floor = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+    let lamp = [[0.0, 1.0, 1.0], [1.0, 1.0, 1.0], [1.0, 0.0, 1.0], [0.0, 0.0, 1.0]];
+    let solution = solve(
+        samples::quads("lamps", &[(floor, Rgb::BLACK, Rgb::grey(1.0)), (lamp, Rgb::BLACK, Rgb::grey(2.0))]),
+        "m2",
+        0.01,
+    );
+    assert_eq!(solution.links().len(), 2);
+    assert!(solution.mean_irradiance(0).0[0] > 0.0);
+}
+
+#[test]
+fn faces_back_to_back_lose_nothing() {
+    // a sheet of two one-sided faces in the middle of a lit room: every ray meets a front first
+    let mut faces = room(0.6);
+    let up = [[5.5, 0.5, 1.0], [7.5, 0.5, 1.0], [7.5, 2.5, 1.0], [5.5, 2.5, 1.0]];
+    let down = [up[3], up[2], up[1], up[0]];
+    faces.push((up, Rgb::grey(0.5), Rgb::BLACK));
+    faces.push((down, Rgb::grey(0.5), Rgb::BLACK));
+    // the lamp is one-sided: its black back faces the ceiling
+    let ledger = Ledger::count(&solve(samples::quads("sheet", &faces), "m2", 0.02), 1 << 16);
+    assert!(ledger.closure().abs() < 0.01, "{ledger:?}");
+}
+
 /// The irradiance of figure 23's receiver in closed form.
 fn figure_23_exact(x: f64, y: f64) -> f64 {
     use ondelette_radiosity::form_factor::{Polygon, point_to_polygon};

@@ -9,6 +9,7 @@
 //! [`SideFrame`] and [`Element`] (where things are) -> pieces (a source split towards a point) -> pairs (moments and
 //! masks) -> [`LightKernel`] (what the links are made of).
 
+mod cover;
 mod element;
 mod pair;
 mod piece;
@@ -39,6 +40,8 @@ pub struct LightKernel {
     occluders: Occluders,
     /// Front and back side of each patch.
     of_patch: Vec<[Option<u32>; 2]>,
+    /// For each side, the later sides that cover parts of it.
+    covers: Vec<Vec<u32>>,
     rays: AtomicU64,
     /// The radiosity of the last solve.
     present: Option<Present>,
@@ -50,7 +53,7 @@ const FREE_RAYS: usize = 16;
 impl LightKernel {
     /// Prepares a scene.
     pub fn new(scene: &Scene) -> Self {
-        let sides = scene
+        let sides: Vec<SideFrame> = scene
             .sides
             .iter()
             .map(|&side| {
@@ -75,7 +78,9 @@ impl LightKernel {
         for (i, side) in scene.sides.iter().enumerate() {
             of_patch[side.patch as usize][usize::from(side.back)] = Some(i as u32);
         }
-        LightKernel { sides, occluders: Occluders::new(scene), of_patch, rays: AtomicU64::new(0), present: None }
+        let occluders = Occluders::new(scene);
+        let covers = cover::covers(&sides, &of_patch, &occluders);
+        LightKernel { sides, occluders, covers, of_patch, rays: AtomicU64::new(0), present: None }
     }
 
     /// The sides, in scene order.
@@ -113,12 +118,18 @@ impl LightKernel {
             let weight = density(x, n, point, element.normal);
             if weight > 0.0 {
                 whole += weight;
-                if !self.occluders.blocked(x, point, [patch, patch]) {
+                let covered = self.is_covered(shooter.root as usize, point);
+                if !covered && !self.occluders.blocked(x, point, [patch, patch]) {
                     open += weight;
                 }
             }
         }
         (factor, if whole > 0.0 { open / whole } else { 0.0 })
+    }
+
+    /// Whether a later, coplanar side that faces the same way covers a point of a side.
+    pub fn is_covered(&self, side: usize, point: DVec3) -> bool {
+        self.covers[side].iter().any(|&top| self.sides[top as usize].holds(point))
     }
 
     /// Visibility rays cast so far: a sum, the same in whatever order the threads add to it.
@@ -203,9 +214,11 @@ impl Kernel for LightKernel {
         if candidates.iter().any(|&p| self.occluders.hides(p, a.corners(), b.corners())) {
             return None;
         }
-        let masked = !candidates.is_empty();
+        let covered = |cell: &Cell| !self.covers[cell.root as usize].is_empty();
+        let masked = !candidates.is_empty() || covered(receiver) || covered(shooter);
         let node = self.present.as_ref().and_then(|p| p.inner_node(shooter));
-        Some(LightPair { kernel: self, receiver: r, shooter: s, cell: *shooter, node, patches, masked })
+        let sides = [receiver.root as usize, shooter.root as usize];
+        Some(LightPair { kernel: self, receiver: r, shooter: s, sides, cell: *shooter, node, patches, masked })
     }
 }
 

@@ -17,6 +17,7 @@ pub struct LightPair<'a> {
     /// The shooter's cell, and its node in the present solution if that has detail below it.
     pub(super) cell: Cell,
     pub(super) node: Option<NodeId>,
+    pub(super) sides: [usize; 2],
     pub(super) patches: [u32; 2],
     pub(super) masked: bool,
 }
@@ -134,6 +135,7 @@ impl LightPair<'_> {
     /// concentrated, near a common edge say, a plain sample of the source would miss most of what arrives.
     fn cast(&self, x: DVec3, samples: usize, key: u64, basis: &CellBasis, seen: &mut Seen) {
         let n = self.receiver.normal;
+        let covered = self.kernel.is_covered(self.sides[0], x);
         let mut parts = Vec::new();
         pieces(x, n, &self.shooter, &mut |piece| parts.push(piece));
         let whole: f64 = parts.iter().map(|p| p.exact).sum();
@@ -154,7 +156,9 @@ impl LightPair<'_> {
                     continue;
                 }
                 rays += 1;
-                let open = !self.kernel.occluders.blocked(x, point, self.patches);
+                let open = !covered
+                    && !self.kernel.is_covered(self.sides[1], point)
+                    && !self.kernel.occluders.blocked(x, point, self.patches);
                 basis.eval(y, &mut values);
                 sum.add(weight, open, &values[..basis.len()]);
                 if open && let (Some(node), Some(present)) = (self.node, &self.kernel.present) {

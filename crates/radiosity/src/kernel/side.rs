@@ -23,6 +23,23 @@ pub struct SideFrame {
 }
 
 impl SideFrame {
+    /// Corners counter-clockwise from the front.
+    pub fn corners(&self) -> Vec<DVec3> {
+        let (o, [u, v]) = (self.origin, self.edges);
+        if self.shape == CellShape::Triangle { vec![o, o + u, o + v] } else { vec![o, o + u, o + u + v, o + v] }
+    }
+
+    /// Whether the projection of a point on the side's plane lies on the side.
+    pub fn holds(&self, point: DVec3) -> bool {
+        let [u, v] = self.edges;
+        let d = point - self.origin;
+        let n = u.cross(v);
+        let inverse = 1.0 / n.length_squared();
+        let [s, t] = [v.cross(n).dot(d) * inverse, n.cross(u).dot(d) * inverse];
+        let triangle = self.shape == CellShape::Triangle;
+        s >= 0.0 && t >= 0.0 && if triangle { s + t <= 1.0 } else { s <= 1.0 && t <= 1.0 }
+    }
+
     /// Side-local coordinates of the point of the side that is closest to `point`.
     pub fn closest(&self, point: DVec3) -> [f64; 2] {
         let [u, v] = self.edges;

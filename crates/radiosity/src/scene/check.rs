@@ -1,5 +1,6 @@
 //! Whether a scene that was stored and read back is one that [`super::SceneDraft::build`] could have made.
 
+use super::draft::RADIANCES;
 use super::{Camera, LARGEST_COORDINATE, SMALLEST_DIAGONAL, Scene, Side};
 use glam::DVec3;
 
@@ -27,7 +28,7 @@ impl Scene {
             if !m.reflectance.0.iter().all(|c| (0.0..1.0).contains(c)) {
                 return Err(format!("material '{}' reflects {:?}, outside [0, 1)", m.name, m.reflectance.0));
             }
-            if !m.radiance.0.iter().all(|c| (0.0..f64::INFINITY).contains(c)) {
+            if !m.radiance.0.iter().all(|c| *c == 0.0 || RADIANCES.contains(c)) {
                 return Err(format!("material '{}' emits {:?}", m.name, m.radiance.0));
             }
         }

@@ -63,6 +63,9 @@ pub const SMALLEST_DIAGONAL: f64 = 1e-9;
 /// A polygon with more corners is refused: cutting it into triangles costs up to the square of their number.
 pub const MOST_CORNERS: usize = 10_000;
 
+/// Radiances that squares and products of f64 can carry; 0 is none.
+pub(super) const RADIANCES: std::ops::RangeInclusive<f64> = 1e-30..=1e30;
+
 /// Why a draft is not a scene.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SceneError {
@@ -110,8 +113,8 @@ pub enum SceneError {
         /// The worst channel.
         value: f64,
     },
-    /// A radiance below zero.
-    #[error("material '{material}' emits a radiance of {value}: light cannot be negative")]
+    /// A radiance below zero, or so large or small that its square is no number any more.
+    #[error("material '{material}' emits a radiance of {value}: give 0, or a number from 1e-30 to 1e30")]
     Radiance {
         /// Name of the material.
         material: String,
@@ -280,7 +283,7 @@ impl SceneDraft {
             if let Some(&value) = m.reflectance.0.iter().find(|c| !(0.0..1.0).contains(*c)) {
                 return Err(SceneError::Reflectance { material: m.name.clone(), value });
             }
-            if let Some(&value) = m.radiance.0.iter().find(|&&c| c < 0.0) {
+            if let Some(&value) = m.radiance.0.iter().find(|&&c| c != 0.0 && !RADIANCES.contains(&c)) {
                 return Err(SceneError::Radiance { material: m.name.clone(), value });
             }
         }
