@@ -177,8 +177,8 @@ impl<const C: usize> Estimate<C> {
         Estimate { total, bias, gains, ends }
     }
 
-    /// The links that `may` be split with the largest gains, which together address `wanted`, at most `most` of them; ties to the lower
-    /// index.
+    /// The links that `may` be split with the largest gains, which together address `wanted`, at most `most` of them;
+    /// ties to the lower index.
     pub fn largest(&self, wanted: f64, most: usize, may: impl Fn(u32) -> bool) -> Vec<u32> {
         let worth = |&k: &u32| self.gains[k as usize] > 0.0 && may(k);
         let mut order: Vec<u32> = (0..self.gains.len() as u32).filter(worth).collect();

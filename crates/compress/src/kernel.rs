@@ -41,8 +41,8 @@ pub trait Pair {
         Masked { mean: 1.0, detail: Detail::default() }
     }
 
-    /// About the largest integral of K(x, y) dy over the shooter, for any x of the receiver: what may have been missed where
-    /// every sample is 0 although the kernel is not certain to be.
+    /// About the largest integral of K(x, y) dy over the shooter, for any x of the receiver: what may have been missed
+    /// where every sample is 0 although the kernel is not certain to be.
     fn largest(&self) -> f64 {
         0.0
     }
@@ -64,8 +64,8 @@ pub struct Masked {
 
 /// What arrives from a shooter as it shoots at present, where the kernel knows that; else zeros.
 ///
-/// The ratio corrects a block for detail of the shooter that goes with kernel or mask: what is hidden from here is often
-/// what is dark, and blocks that only know the shooter's own coefficients lose light by it.
+/// The ratio corrects a block for detail of the shooter that goes with kernel or mask: what is hidden from here is
+/// often what is dark, and blocks that only know the shooter's own coefficients miss it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Detail {
     /// From the shooter's function in all its detail.

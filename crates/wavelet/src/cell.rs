@@ -374,8 +374,8 @@ impl CellBasis {
 
     /// Mean square of the projection that pulled coefficients stand for.
     ///
-    /// Orthonormal bases: the sum of squares. Pulled flatlet coefficients are means against the dual staircases, so their
-    /// Gram matrix comes in (of the staircases one level down, where they differ most from boxes).
+    /// Orthonormal bases: the sum of squares. Pulled flatlet coefficients are means against the dual staircases, so
+    /// their Gram matrix comes in (of the staircases one level down, where they differ most from boxes).
     pub fn projected_square(&self, pulled: impl Iterator<Item = f64>) -> f64 {
         if self.inverse_gram.is_empty() {
             return pulled.map(|c| c * c).sum();
@@ -408,8 +408,8 @@ impl CellBasis {
         }
     }
 
-    /// A pulled coefficient is the mean of the function times the staircase of height n T_c\[i\]\[k\] on box k of child c
-    /// (n boxes a cell); this inverts the Gram matrix n/arity sum_c T_c T_c^T of these staircases.
+    /// A pulled coefficient is the mean of the function times the staircase of height n T_c\[i\]\[k\] on box k of child
+    /// c (n boxes a cell); this inverts the Gram matrix n/arity sum_c T_c T_c^T of these staircases.
     fn make_inverse_gram(&self) -> Vec<f64> {
         let n = self.len();
         let mut gram = vec![0.0; n * n];

@@ -1,7 +1,7 @@
 //! Coplanar faces that face the same way: a carpet on a floor, a panel on a wall, a decal.
 //!
-//! No ray separates them, so the order of the file decides: of two such faces the later one covers the earlier, which is
-//! dark there and sends nothing out. Without this rule both would receive, and both reflect, the same light.
+//! No ray separates them, so the order of the file decides: of two such faces the later one covers the earlier, which
+//! is dark there and sends nothing out. Without this rule both would receive, and both reflect, the same light.
 
 use super::SideFrame;
 use crate::form_factor::Polygon;

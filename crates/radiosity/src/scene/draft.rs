@@ -114,7 +114,9 @@ pub enum SceneError {
         value: f64,
     },
     /// A radiance below zero, or so large or small that its square is no number any more.
-    #[error("material '{material}' emits a radiance of {value}: give 0, or a number from 1e-30 to 1e30")]
+    #[error(
+        "material '{material}' emits a radiance of {value}: light cannot be negative, and must be 0 or from 1e-30 to 1e30"
+    )]
     Radiance {
         /// Name of the material.
         material: String,
