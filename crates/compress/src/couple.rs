@@ -15,8 +15,8 @@ pub struct CoupleSettings {
     pub negligible: f64,
     /// Most mask samples for one receiver point.
     pub samples: usize,
-    /// The last look at a pair: all mask samples at once, and the shooter's present detail taken into account even
-    /// where nothing masks it.
+    /// The last look at a pair: more mask samples before they may agree, and the shooter's present detail taken into
+    /// account even where nothing masks it.
     pub thorough: bool,
 }
 
@@ -75,9 +75,8 @@ pub fn couple<K: Kernel>(
         let smooth = moments.clone();
         // all points with few samples first; only where they disagree is the pair worth the rest. A point must not
         // decide for itself: stopping when its first samples agree would bias the mask towards 0 and 1.
-        // For the same reason the last look takes all samples at once: pairs of which nothing was seen are never
-        // refined.
-        mask_samples = if settings.thorough { settings.samples } else { settings.samples.min(FIRST_SAMPLES) };
+        // The last look has more first samples: pairs of which nothing was seen are never refined.
+        mask_samples = settings.samples.min(if settings.thorough { 2 * FIRST_SAMPLES } else { FIRST_SAMPLES });
         seen = MaskSums::take(&pair, &places, shooter_basis, &mut moments, mask_samples, key);
         if seen.is_mixed() && settings.samples > mask_samples {
             moments = smooth;

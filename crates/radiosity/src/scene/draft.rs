@@ -115,7 +115,8 @@ pub enum SceneError {
     },
     /// A radiance below zero, or so large or small that its square is no number any more.
     #[error(
-        "material '{material}' emits a radiance of {value}: light cannot be negative, and must be 0 or from 1e-30 to 1e30"
+        "material '{material}' emits a radiance of {value}: light cannot be negative, \
+         and must be 0 or from 1e-30 to 1e30"
     )]
     Radiance {
         /// Name of the material.
