@@ -1,10 +1,13 @@
 //! Wavelet bases.
 
+mod axis;
 mod banded;
 mod coefficient;
+mod decomposition;
 pub mod exact;
 mod extension;
 mod family;
+pub mod gram;
 mod lifted;
 mod lifting;
 pub mod open;
@@ -15,9 +18,11 @@ mod scaling;
 mod sparse;
 mod sweep;
 mod tables;
+mod tensor;
 pub mod tree;
 
 pub use coefficient::{Coefficient, Scalar};
+pub use decomposition::{Block, Decomposition, FunctionNorms, Norms, Part};
 pub use family::{Boundary, Family, FamilyError, SplineFamily};
 pub use open::{OpenColumns, OpenKnots};
 pub use piecewise::Piecewise;
@@ -25,4 +30,5 @@ pub use pyramid::{Pyramid, PyramidError, TransformError, levels_allowed};
 pub use rung::{Kind, Rung};
 pub use scaling::{EnergyDiagonals, Heights, Scaling, energy_diagonals};
 pub use sparse::Sparse;
+pub use tensor::{Layout, Tensor, TensorError};
 pub use tree::{OrderError, TreeFamily, TreeKind};

@@ -220,10 +220,8 @@ pub(crate) fn cdf97() -> Scheme<f64> {
 
 /// Daubechies' bank of `2 p` taps from its lattice; see [`crate::tables::DAUBECHIES_LATTICE`].
 pub(crate) fn daubechies(angles: &[f64]) -> Scheme<f64> {
-    let steps = angles.iter().enumerate().map(|(i, &t)| Step::Rotate {
-        t: if i == 0 { t } else { -t },
-        offset: i as isize,
-    });
+    let steps =
+        angles.iter().enumerate().map(|(i, &t)| Step::Rotate { t: if i == 0 { t } else { -t }, offset: i as isize });
     let steps: Vec<_> = steps.collect();
     // Orthogonal up to its length, which is divided out; 1/sqrt2 makes the smooth half a mean, as in Eq. 11.
     let length: f64 = angles.iter().map(|t| 1.0 + t * t).product::<f64>().sqrt();
@@ -239,7 +237,11 @@ pub(crate) fn analysis_filters(scheme: &Scheme<f64>) -> [(isize, Vec<f64>); 2] {
     let mut out = [(2 * lo, vec![0.0; 2 * n]), (2 * lo, vec![0.0; 2 * n])];
     for at in 0..2 * n {
         let (mut e, mut o) = (vec![0.0; n], vec![0.0; n]);
-        if at % 2 == 0 { e[at / 2] = 1.0 } else { o[at / 2] = 1.0 }
+        if at % 2 == 0 {
+            e[at / 2] = 1.0
+        } else {
+            o[at / 2] = 1.0
+        }
         for (step, r) in scheme.steps.iter().zip(&needs.steps) {
             run_step(step, &mut e, &mut o, (r.lo - lo) as usize, (1 + r.hi - lo) as usize);
         }

@@ -73,9 +73,8 @@ impl OpenKnots {
 
     /// Exact Gram matrix of derivatives, row-major: entry `(i, j)` is `int D^a B_i D^a B_j`.
     pub fn gram(&self, derivative: usize) -> Vec<Vec<BigRational>> {
-        let functions: Vec<_> = (0..self.spans() + 3)
-            .map(|j| (0..derivative).fold(self.function(j), |f, _| f.derivative()))
-            .collect();
+        let functions: Vec<_> =
+            (0..self.spans() + 3).map(|j| (0..derivative).fold(self.function(j), |f, _| f.derivative())).collect();
         functions.iter().map(|f| functions.iter().map(|g| f.inner(g)).collect()).collect()
     }
 

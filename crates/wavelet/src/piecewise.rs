@@ -62,10 +62,8 @@ impl Piecewise {
             .windows(2)
             .map(|span| {
                 // de Boor's recursion on this span, in powers of u = t - span[0].
-                let mut level: Vec<Vec<BigRational>> = knots
-                    .windows(2)
-                    .map(|k| if k == span { vec![BigRational::one()] } else { Vec::new() })
-                    .collect();
+                let mut level: Vec<Vec<BigRational>> =
+                    knots.windows(2).map(|k| if k == span { vec![BigRational::one()] } else { Vec::new() }).collect();
                 // With repeated knots a span can only equal the last of its copies, which is the right one.
                 for d in 1..knots.len() - 1 {
                     level = (0..knots.len() - 1 - d)
@@ -226,7 +224,10 @@ mod tests {
     fn cubic_segments_are_those_of_equation_7() {
         let phi = Piecewise::bspline(&[0, 1, 2, 3, 4]);
         let sixth = |c: [i64; 4]| c.map(|c| ratio(c, 6)).to_vec();
-        assert_eq!(phi.pieces(), [sixth([0, 0, 0, 1]), sixth([1, 3, 3, -3]), sixth([4, 0, -6, 3]), sixth([1, -3, 3, -1])]);
+        assert_eq!(
+            phi.pieces(),
+            [sixth([0, 0, 0, 1]), sixth([1, 3, 3, -3]), sixth([4, 0, -6, 3]), sixth([1, -3, 3, -1])]
+        );
         assert_eq!(phi.integral(), ratio(1, 1));
         assert_eq!(phi.moment(1), ratio(2, 1));
         assert_eq!(phi.inner(&phi), ratio(151, 315));

@@ -170,7 +170,11 @@ impl Rung {
     #[track_caller]
     fn check(&self, fine: usize, smooth: usize, detail: usize) {
         let own = (self.fine(), self.smooth(), self.detail());
-        assert!(own == (fine, smooth, detail), "rung of (fine, smooth, detail) {own:?} got {:?}", (fine, smooth, detail));
+        assert!(
+            own == (fine, smooth, detail),
+            "rung of (fine, smooth, detail) {own:?} got {:?}",
+            (fine, smooth, detail)
+        );
     }
 }
 
@@ -233,7 +237,7 @@ impl Lifted {
 }
 
 impl Block {
-    fn up<S: Scalar>(&self, kind: Kind, fine: &[S], smooth: &mut [S], detail: &mut [S], channels: usize) {
+    pub(crate) fn up<S: Scalar>(&self, kind: Kind, fine: &[S], smooth: &mut [S], detail: &mut [S], channels: usize) {
         let (m, width) = (self.order, 2 * self.order);
         let matrix: Vec<S> = match kind {
             Kind::Coefficients => self.dual.iter().map(|&x| S::from_f64(x)).collect(),
@@ -251,7 +255,7 @@ impl Block {
         }
     }
 
-    fn down<S: Scalar>(&self, kind: Kind, smooth: &[S], detail: &[S], fine: &mut [S], channels: usize) {
+    pub(crate) fn down<S: Scalar>(&self, kind: Kind, smooth: &[S], detail: &[S], fine: &mut [S], channels: usize) {
         let (m, width) = (self.order, 2 * self.order);
         let matrix: Vec<S> = match kind {
             Kind::Coefficients => self.primal.iter().map(|&x| S::from_f64(x)).collect(),

@@ -129,8 +129,7 @@ pub fn energy_diagonals(pyramid: &Pyramid, energy: &Sparse) -> EnergyDiagonals {
     for i in (0..levels).rev() {
         let rung = pyramid.rung(i);
         let synthesis = rung.synthesis();
-        let (smooth, detail) =
-            (synthesis.columns(0, rung.smooth()), synthesis.columns(rung.smooth(), rung.fine()));
+        let (smooth, detail) = (synthesis.columns(0, rung.smooth()), synthesis.columns(rung.smooth(), rung.fine()));
         // diag(D^T H D) without forming the product's off-diagonal.
         let hd = h.product(&detail).transposed();
         let dt = detail.transposed();

@@ -115,13 +115,7 @@ impl<'a, S: Scalar> Sweep<'a, S> {
     }
 }
 
-fn run_rows<S: Scalar>(
-    step: &Step<S>,
-    even: &mut Ring<S>,
-    odd: &mut Ring<S>,
-    k: isize,
-    x: std::ops::Range<usize>,
-) {
+fn run_rows<S: Scalar>(step: &Step<S>, even: &mut Ring<S>, odd: &mut Ring<S>, k: isize, x: std::ops::Range<usize>) {
     match step {
         Step::Lift { odd: target_odd, first, taps } => {
             let (target, other) = if *target_odd { (odd, &*even) } else { (even, &*odd) };

@@ -190,7 +190,13 @@ pub fn multiwavelet_squares(order: usize) -> Vec<Vec<SignedSquare>> {
             row.iter()
                 .zip(&weights)
                 .map(|(x, w)| {
-                    let sign = if x.is_zero() { 0 } else if x.is_positive() == last { 1 } else { -1 };
+                    let sign = if x.is_zero() {
+                        0
+                    } else if x.is_positive() == last {
+                        1
+                    } else {
+                        -1
+                    };
                     (sign, x * x * w / &norm)
                 })
                 .collect()
