@@ -1,8 +1,7 @@
-//! One rung along one axis of a box, and the fused two-axis level of a picture.
+//! One rung along one axis of a box.
 //!
-//! A box is `outer x n x inner`, row-major. Rows (`inner = 1`) run block by block; other axes run as sweeps over rows;
-//! a picture level runs both in one sweep: rows are transformed on their way into the ring of the column sweep, so
-//! that every level reads its input once and writes its output once. Bands of rows are independent tasks.
+//! A box is `outer x n x inner`, row-major. Rows (`inner = 1`) run block by block, other axes as sweeps over rows. Bands
+//! of rows are independent tasks.
 
 use crate::coefficient::Scalar;
 use crate::extension::Ends;
@@ -12,20 +11,20 @@ use crate::sweep::Sweep;
 use ondelette_numerics::par;
 
 /// Pairs of rows per task.
-const BAND: usize = 128;
+pub(crate) const BAND: usize = 256;
 /// Values below which threads cost more than they give.
 const SMALL: usize = 1 << 15;
 
-fn run<T: Send>(work: usize, tasks: Vec<T>, f: impl Fn(T) + Sync) {
+pub(crate) fn run<T: Send>(work: usize, tasks: Vec<T>, f: impl Fn(T) + Sync) {
     if work < SMALL || tasks.len() < 2 { tasks.into_iter().for_each(f) } else { par::for_each(tasks, f) }
 }
 
-fn on_mirror(ends: Ends, i: usize, n: usize) -> bool {
+pub(crate) fn on_mirror(ends: Ends, i: usize, n: usize) -> bool {
     (ends.first && i == 0) || (ends.last && i + 1 == n)
 }
 
 /// `to = by * from`.
-fn put<S: Scalar>(to: &mut [S], from: &[S], by: S) {
+pub(crate) fn put<S: Scalar>(to: &mut [S], from: &[S], by: S) {
     for (t, f) in to.iter_mut().zip(from) {
         *t = by * *f;
     }
@@ -162,7 +161,7 @@ pub(crate) fn down<S: Scalar>(rung: &Rung, kind: Kind, src: &[S], dst: &mut [S],
     }
 }
 
-fn weigh_in<S: Scalar>(program: &Program<S>, ends: Ends, i: usize, n: usize, row: &mut [S]) {
+pub(crate) fn weigh_in<S: Scalar>(program: &Program<S>, ends: Ends, i: usize, n: usize, row: &mut [S]) {
     if program.weigh && on_mirror(ends, i, n) {
         let two = S::from_f64(2.0);
         row.iter_mut().for_each(|x| *x *= two);
@@ -170,20 +169,20 @@ fn weigh_in<S: Scalar>(program: &Program<S>, ends: Ends, i: usize, n: usize, row
 }
 
 /// What smooth row `k` and detail row `k` are multiplied by as they leave.
-fn gains_up<S: Scalar>(program: &Program<S>, k: usize, ns: usize, nd: usize) -> (S, S) {
+pub(crate) fn gains_up<S: Scalar>(program: &Program<S>, k: usize, ns: usize, nd: usize) -> (S, S) {
     let half = |on: bool| S::from_f64(if program.weigh && on { 0.5 } else { 1.0 });
     let (e, n) = (program.extension, program.n);
     let (s, d) = program.scheme.scale;
     (s * half(on_mirror(e.smooth_ends(n), k, ns)), d * half(on_mirror(e.detail_ends(n), k, nd)))
 }
 
-fn gain_down<S: Scalar>(program: &Program<S>, p: usize) -> S {
+pub(crate) fn gain_down<S: Scalar>(program: &Program<S>, p: usize) -> S {
     let on = program.weigh && on_mirror(program.extension.fine_ends(), p, program.n);
     S::from_f64(if on { 0.5 } else { 1.0 })
 }
 
 /// Row and factor of the smooth or detail coefficient at even or odd position `k`.
-fn half_at<S: Scalar>(program: &Program<S>, odd: bool, k: isize, ns: usize, nd: usize) -> (usize, S) {
+pub(crate) fn half_at<S: Scalar>(program: &Program<S>, odd: bool, k: isize, ns: usize, nd: usize) -> (usize, S) {
     let (e, n) = (program.extension, program.n);
     let double = |on: bool| if program.weigh && on { 2.0 } else { 1.0 };
     if odd {
@@ -193,87 +192,4 @@ fn half_at<S: Scalar>(program: &Program<S>, odd: bool, k: isize, ns: usize, nd: 
         let i = e.smooth(n, k);
         (i, program.scheme.scale.0 * S::from_f64(double(on_mirror(e.smooth_ends(n), i, ns))))
     }
-}
-
-/// One level of a picture towards coarser, both axes in one sweep.
-///
-/// `src` is compact; the all-smooth quarter goes to `coarse` (compact), the rest to its place in `out`, whose rows are
-/// `stride` apart: axis-0 smooth rows first, then detail rows, each row smooth then detail.
-pub(crate) fn up_picture<S: Scalar>(
-    programs: [&Program<S>; 2],
-    src: &[S],
-    coarse: &mut [S],
-    out: &mut [S],
-    stride: usize,
-) {
-    let [col, row] = programs;
-    let (r, c) = (col.n, row.n);
-    let (rs, rd, cs) = (r.div_ceil(2), r / 2, c.div_ceil(2));
-    let sweep = Sweep::new(col, col.scheme.shift);
-    let (top, bottom) = out.split_at_mut(rs * stride);
-    let mut bottoms = bottom.chunks_mut(BAND * stride);
-    let tops = top.chunks_mut(BAND * stride).zip(coarse.chunks_mut(BAND * cs));
-    let tasks = tops
-        .enumerate()
-        .map(|(b, (top, coarse))| (b * BAND, coarse, top, bottoms.next().unwrap_or_default()))
-        .collect();
-    run(src.len(), tasks, |(k0, coarse, top, bottom): (usize, &mut [S], &mut [S], &mut [S])| {
-        let mut scratch = Scratch::default();
-        let fetch = |odd: bool, k: isize, to: &mut [S]| {
-            let p = col.extension.fine(r, 2 * k + isize::from(odd));
-            let (s, d) = to.split_at_mut(cs);
-            row.up(&src[p * c..][..c], s, d, &mut scratch);
-            weigh_in(col, col.extension.fine_ends(), p, r, to);
-        };
-        sweep.run(k0, (k0 + BAND).min(rs), c, fetch, |k, e, o| {
-            let (gs, gd) = gains_up(col, k, rs, rd);
-            put(&mut coarse[(k - k0) * cs..][..cs], &e[..cs], gs);
-            put(&mut top[(k - k0) * stride + cs..][..c - cs], &e[cs..], gs);
-            if k < rd {
-                put(&mut bottom[(k - k0) * stride..][..c], o, gd);
-            }
-        });
-    });
-}
-
-/// One level of a picture towards finer: the reverse of [`up_picture`].
-pub(crate) fn down_picture<S: Scalar>(
-    programs: [&Program<S>; 2],
-    coarse: &[S],
-    details: &[S],
-    stride: usize,
-    dst: &mut [S],
-) {
-    let [col, row] = programs;
-    let (r, c) = (col.n, row.n);
-    let (rs, rd, cs) = (r.div_ceil(2), r / 2, c.div_ceil(2));
-    let sweep = Sweep::new(col, 0);
-    let tasks = dst.chunks_mut(2 * BAND * c).enumerate().map(|(b, rows)| (b * BAND, rows)).collect();
-    run(coarse.len() * 4, tasks, |(k0, rows): (usize, &mut [S])| {
-        let mut scratch = Scratch::default();
-        let fetch = |odd: bool, k: isize, to: &mut [S]| {
-            let (i, by) = half_at(col, odd, k, rs, rd);
-            if odd && rd == 0 {
-                to.fill(S::default());
-            } else if odd {
-                put(to, &details[(rs + i) * stride..][..c], by);
-            } else {
-                put(&mut to[..cs], &coarse[i * cs..][..cs], by);
-                put(&mut to[cs..], &details[i * stride + cs..][..c - cs], by);
-            }
-        };
-        let k1 = k0 + (rows.len() / c).div_ceil(2);
-        sweep.run(k0, k1, c, fetch, |k, e, o| {
-            for (p, from) in [(2 * k, e), (2 * k + 1, o)] {
-                if p < r {
-                    let to = &mut rows[(p - 2 * k0) * c..][..c];
-                    row.down(&from[..cs], &from[cs..], to, &mut scratch);
-                    let by = gain_down(col, p);
-                    if by != S::from_f64(1.0) {
-                        to.iter_mut().for_each(|x| *x *= by);
-                    }
-                }
-            }
-        });
-    });
 }

@@ -100,15 +100,20 @@ coefficient!(f32, f64);
 
 /// Index of the first number that is NaN or infinite.
 pub(crate) fn first_not_finite<S: Scalar>(x: &[S]) -> Option<usize> {
-    // A finite sum of |x| * 0 is 0; anything else in a block makes it NaN.
+    // x * 0 is 0 for finite x and NaN otherwise; lanes add up independently so that the loop vectorises.
     const BLOCK: usize = 4096;
+    const LANES: usize = 16;
     let zero = S::default();
     for (b, block) in x.chunks(BLOCK).enumerate() {
-        let mut sum = zero;
-        for &v in block {
-            sum += v * zero;
+        let mut sum = [zero; LANES];
+        let mut lanes = block.chunks_exact(LANES);
+        for chunk in &mut lanes {
+            for (s, &v) in sum.iter_mut().zip(chunk) {
+                *s += v * zero;
+            }
         }
-        if !(sum == zero) {
+        let rest = lanes.remainder().iter().all(|&v| v * zero == zero);
+        if !rest || sum.iter().any(|s| *s != zero) {
             return block.iter().position(|v| !v.to_f64().is_finite()).map(|i| b * BLOCK + i);
         }
     }

@@ -4,6 +4,7 @@
 //! margin, continued beyond the ends of the array by the [`Extension`], and the steps run in place on the two arrays.
 
 use crate::coefficient::Scalar;
+use crate::cubic::{self, Buffers, Cubic};
 use crate::extension::{Ends, Extension};
 use crate::lifting::{Needs, Scheme, run_step};
 use crate::rung::Kind;
@@ -29,6 +30,8 @@ pub(crate) struct Program<S> {
     pub(crate) needs: Needs,
     /// Transposed verbs count samples on a mirror once where the extended sequence counts the others twice.
     pub(crate) weigh: bool,
+    /// The fused loops, if the bank has the three steps of (4, 4).
+    pub(crate) cubic: Option<Cubic<S>>,
 }
 
 impl Lifted {
@@ -38,7 +41,7 @@ impl Lifted {
             Kind::Coefficients => self.scheme.cast(),
             Kind::Basis => self.scheme.dual().cast(),
         };
-        self.program(kind, scheme.shift, scheme)
+        self.program(kind, scheme.shift, scheme, false)
     }
 
     /// Towards finer: synthesis, or the transpose of the analysis.
@@ -47,13 +50,14 @@ impl Lifted {
             Kind::Coefficients => self.scheme.inverse().cast(),
             Kind::Basis => self.scheme.dual().inverse().cast(),
         };
-        self.program(kind, 0, scheme)
+        self.program(kind, 0, scheme, true)
     }
 
-    fn program<S: Scalar>(&self, kind: Kind, shift: isize, scheme: Scheme<S>) -> Program<S> {
+    fn program<S: Scalar>(&self, kind: Kind, shift: isize, scheme: Scheme<S>, down: bool) -> Program<S> {
         let needs = scheme.needs(shift);
         let weigh = kind == Kind::Basis && self.extension != Extension::Periodic;
-        Program { n: self.n, extension: self.extension, scheme, needs, weigh }
+        let cubic = Cubic::recognise(&scheme, down).filter(|_| !weigh && self.extension != Extension::Half);
+        Program { n: self.n, extension: self.extension, scheme, needs, weigh, cubic }
     }
 }
 
@@ -62,6 +66,7 @@ impl Lifted {
 pub(crate) struct Scratch<S> {
     even: Vec<S>,
     odd: Vec<S>,
+    buffers: Buffers<S>,
 }
 
 /// Multiplies the ends that lie on a mirror.
@@ -91,9 +96,7 @@ impl<S: Scalar> Program<S> {
     fn prepare(&self, scratch: &mut Scratch<S>, pairs: usize) {
         let hi = self.needs.even.hi.max(self.needs.odd.hi);
         let len = pairs + (hi - self.origin()) as usize;
-        scratch.even.clear();
         scratch.even.resize(len, S::default());
-        scratch.odd.clear();
         scratch.odd.resize(len, S::default());
     }
 
@@ -109,6 +112,10 @@ impl<S: Scalar> Program<S> {
     pub(crate) fn up(&self, fine: &[S], smooth: &mut [S], detail: &mut [S], scratch: &mut Scratch<S>) {
         debug_assert_eq!(fine.len(), self.n);
         let (ns, nd) = (smooth.len(), detail.len());
+        if let Some(cubic) = &self.cubic {
+            cubic.up(fine, 0, (smooth, detail), &mut scratch.buffers, |p| self.extension.fine(self.n, p));
+            return;
+        }
         let lo = self.origin();
         let (gain_s, gain_d) = self.scheme.scale;
         for k0 in (0..ns).step_by(BLOCK) {
@@ -135,8 +142,16 @@ impl<S: Scalar> Program<S> {
     /// The two halves to fine samples.
     pub(crate) fn down(&self, smooth: &[S], detail: &[S], fine: &mut [S], scratch: &mut Scratch<S>) {
         debug_assert_eq!(fine.len(), self.n);
-        let lo = self.origin();
         let ns = smooth.len();
+        if let Some(steps) = &self.cubic {
+            let block = cubic::block::<S>();
+            for (b, out) in fine.chunks_mut(2 * block).enumerate() {
+                let index = (|k| self.extension.smooth(self.n, k), |k| self.extension.detail(self.n, k).0);
+                steps.down(smooth, detail, b * block, out, &mut scratch.buffers, index);
+            }
+            return;
+        }
+        let lo = self.origin();
         for k0 in (0..ns).step_by(BLOCK) {
             let len = BLOCK.min(ns - k0);
             self.prepare(scratch, len);

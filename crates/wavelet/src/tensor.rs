@@ -5,6 +5,7 @@ use std::ops::Range;
 use crate::axis;
 use crate::coefficient::{Coefficient, Scalar};
 use crate::decomposition::{Decomposition, blocks_of};
+use crate::picture;
 use crate::pyramid::{Pyramid, TransformError, check};
 use crate::rung::{Engine, Kind, put_channel, take_channel};
 
@@ -130,13 +131,28 @@ impl Tensor {
     /// # Errors
     /// Wrong length; a value that is not finite.
     pub fn up_into<C: Coefficient>(&self, kind: Kind, grid: &[C], out: &mut [C]) -> Result<(), TransformError> {
+        self.up_with(kind, grid, out, &mut Workspace::default())
+    }
+
+    /// [`Tensor::up_into`] with memory of an earlier call: saves the page faults of fresh memory, which for large
+    /// grids cost as much as the arithmetic.
+    ///
+    /// # Errors
+    /// Wrong length; a value that is not finite.
+    pub fn up_with<C: Coefficient>(
+        &self,
+        kind: Kind,
+        grid: &[C],
+        out: &mut [C],
+        work: &mut Workspace<C::Scalar>,
+    ) -> Result<(), TransformError> {
         let n = self.len() * C::CHANNELS;
         check(C::flat(grid), n)?;
         self.check_out(C::flat(out), n)?;
         self.by_channel(grid, out, |from, to| {
             match self.layout {
                 Layout::Standard => self.standard_up(kind, from, to),
-                Layout::NonStandard => self.nonstandard_up(kind, from, to),
+                Layout::NonStandard => self.nonstandard_up(kind, from, to, work),
             }
             self.scale(kind, to, false);
         });
@@ -148,6 +164,20 @@ impl Tensor {
     /// # Errors
     /// Wrong length; a value that is not finite.
     pub fn down_into<C: Coefficient>(&self, kind: Kind, wavelets: &[C], out: &mut [C]) -> Result<(), TransformError> {
+        self.down_with(kind, wavelets, out, &mut Workspace::default())
+    }
+
+    /// [`Tensor::down_into`] with memory of an earlier call.
+    ///
+    /// # Errors
+    /// Wrong length; a value that is not finite.
+    pub fn down_with<C: Coefficient>(
+        &self,
+        kind: Kind,
+        wavelets: &[C],
+        out: &mut [C],
+        work: &mut Workspace<C::Scalar>,
+    ) -> Result<(), TransformError> {
         let n = self.len() * C::CHANNELS;
         check(C::flat(wavelets), n)?;
         self.check_out(C::flat(out), n)?;
@@ -164,7 +194,7 @@ impl Tensor {
             };
             match self.layout {
                 Layout::Standard => self.standard_down(kind, from, to),
-                Layout::NonStandard => self.nonstandard_down(kind, from, to),
+                Layout::NonStandard => self.nonstandard_down(kind, from, to, work),
             }
         });
         Ok(())
@@ -175,7 +205,7 @@ impl Tensor {
     }
 
     /// Runs `f` on each channel as an array of its own.
-    fn by_channel<C: Coefficient>(&self, from: &[C], to: &mut [C], f: impl Fn(&[C::Scalar], &mut [C::Scalar])) {
+    fn by_channel<C: Coefficient>(&self, from: &[C], to: &mut [C], mut f: impl FnMut(&[C::Scalar], &mut [C::Scalar])) {
         if C::CHANNELS == 1 {
             return f(C::flat(from), C::flat_mut(to));
         }
@@ -235,57 +265,58 @@ impl Tensor {
         self.axes.iter().map(|a| a.smooth_len(level)).collect()
     }
 
-    fn nonstandard_up<S: Scalar>(&self, kind: Kind, from: &[S], to: &mut [S]) {
+    fn nonstandard_up<S: Scalar>(&self, kind: Kind, from: &[S], to: &mut [S], work: &mut Workspace<S>) {
         let shape = self.shape();
         let levels = self.levels();
         if levels == 0 {
             return to.copy_from_slice(from);
         }
-        let mut owned: Vec<S> = Vec::new();
         for level in (0..levels).rev() {
-            let now = if level + 1 == levels { from } else { &owned[..] };
             let coarse_shape = self.level_shape(level);
-            let mut coarse = vec![S::default(); coarse_shape.iter().product()];
+            let (now, coarse) = work.pair(levels - level, coarse_shape.iter().product());
+            let now = if level + 1 == levels { from } else { now };
             let engines = self.axes.iter().map(|a| &a.rung(level).engine).collect::<Vec<_>>();
             if let [Engine::Lifted(a), Engine::Lifted(b)] = engines[..] {
-                axis::up_picture([&a.up(kind), &b.up(kind)], now, &mut coarse, to, shape[1]);
+                picture::up_picture([&a.up(kind), &b.up(kind)], now, coarse, to, shape[1]);
             } else {
-                let all = self.split_level(level, &vec![kind; self.axes.len()], now.to_vec());
                 let fine_shape = self.level_shape(level + 1);
+                let len: usize = fine_shape.iter().product();
+                let all = self.split_level(level, &vec![kind; self.axes.len()], now[..len].to_vec());
                 copy_box(&all, &fine_shape, to, &shape, &fine_shape);
-                copy_box(&all, &fine_shape, &mut coarse, &coarse_shape, &coarse_shape);
+                copy_box(&all, &fine_shape, coarse, &coarse_shape, &coarse_shape);
             }
-            owned = coarse;
+            if level == 0 {
+                copy_box(coarse, &coarse_shape, to, &shape, &coarse_shape);
+            }
         }
-        let coarse_shape = self.level_shape(0);
-        copy_box(&owned, &coarse_shape, to, &shape, &coarse_shape);
     }
 
-    fn nonstandard_down<S: Scalar>(&self, kind: Kind, from: &[S], to: &mut [S]) {
+    fn nonstandard_down<S: Scalar>(&self, kind: Kind, from: &[S], to: &mut [S], work: &mut Workspace<S>) {
         let shape = self.shape();
         let levels = self.levels();
         if levels == 0 {
             return to.copy_from_slice(from);
         }
         let coarse_shape = self.level_shape(0);
-        let mut coarse = vec![S::default(); coarse_shape.iter().product()];
-        copy_box(from, &shape, &mut coarse, &coarse_shape, &coarse_shape);
+        let (_, coarse) = work.pair(levels, coarse_shape.iter().product());
+        copy_box(from, &shape, coarse, &coarse_shape, &coarse_shape);
         for level in 0..levels {
             let fine_shape = self.level_shape(level + 1);
+            let coarse_shape = self.level_shape(level);
             let last = level + 1 == levels;
-            let mut owned = vec![S::default(); if last { 0 } else { fine_shape.iter().product() }];
-            let fine = if last { &mut *to } else { &mut owned[..] };
+            // The pair of the level above: what it calls its output is read here.
+            let (coarse, fine) = work.pair(levels - level - 1, if last { 0 } else { fine_shape.iter().product() });
+            let fine = if last { &mut *to } else { fine };
+            let coarse = &coarse[..coarse_shape.iter().product()];
             let engines = self.axes.iter().map(|a| &a.rung(level).engine).collect::<Vec<_>>();
             if let [Engine::Lifted(a), Engine::Lifted(b)] = engines[..] {
-                axis::down_picture([&a.down(kind), &b.down(kind)], &coarse, from, shape[1], fine);
+                picture::down_picture([&a.down(kind), &b.down(kind)], coarse, from, shape[1], fine);
             } else {
                 copy_box(from, &shape, fine, &fine_shape, &fine_shape);
-                let coarse_shape = self.level_shape(level);
-                copy_box(&coarse, &coarse_shape, fine, &fine_shape, &coarse_shape);
+                copy_box(coarse, &coarse_shape, fine, &fine_shape, &coarse_shape);
                 let done = self.merge_level(level, &vec![kind; self.axes.len()], fine.to_vec());
                 fine.copy_from_slice(&done);
             }
-            coarse = owned;
         }
     }
 
@@ -325,6 +356,25 @@ impl Tensor {
                 for_rows(&shape, &block.ranges, |row| values[row].iter_mut().for_each(|x| *x *= by));
             }
         }
+    }
+}
+
+/// Memory that transforms can share; see [`Tensor::up_with`].
+#[derive(Clone, Debug, Default)]
+pub struct Workspace<S> {
+    /// The smooth coefficients of every other level.
+    turns: [Vec<S>; 2],
+}
+
+impl<S: Scalar> Workspace<S> {
+    /// The array of the level before `turn`, and that of `turn` with `len` values.
+    fn pair(&mut self, turn: usize, len: usize) -> (&[S], &mut [S]) {
+        let [a, b] = &mut self.turns;
+        let (before, now) = if turn % 2 == 1 { (a, b) } else { (b, a) };
+        if now.len() < len {
+            now.resize(len, S::default());
+        }
+        (before, &mut now[..len])
     }
 }
 
