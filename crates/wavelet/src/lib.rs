@@ -20,6 +20,7 @@ mod picture;
 mod piecewise;
 mod pyramid;
 mod rung;
+mod sampling;
 mod scaling;
 mod space;
 mod sparse;
@@ -38,6 +39,7 @@ pub use operator::{Expansion, LevelBox, NonStandardOperator, OperatorError, Stan
 pub use piecewise::Piecewise;
 pub use pyramid::{Pyramid, PyramidError, TransformError, levels_allowed};
 pub use rung::{Kind, Rung};
+pub use sampling::{Sampling, SamplingError};
 pub use scaling::{EnergyDiagonals, Heights, Scaling, energy_diagonals};
 pub use space::{SpaceError, SplineSpace};
 pub use sparse::Sparse;
