@@ -1,7 +1,29 @@
-//! Wavelet bases.
+//! Wavelet bases: B-splines, trees, Daubechies; exact, for any length, fast.
+//!
+//! The ladder: a [`Family`] with a [`Boundary`] gives nested spaces; a [`Rung`] joins two of them with four verbs; a
+//! [`Pyramid`] climbs one axis; a [`Tensor`] climbs grids and returns a [`Decomposition`] that knows its layout.
+//! [`SplineSpace`] and [`Piecewise`] say what coefficients mean as functions, [`gram`] integrates them,
+//! [`NonStandardOperator`] holds operators in wavelets. Tables are exact rationals ([`exact`]); every inverse and
+//! transpose is derived from them.
+//!
+//! ```
+//! use ondelette_wavelet::{Boundary, Layout, Pyramid, Tensor};
+//! // A 100 x 70 grid of cubic B-spline coefficients, mirrored at its edges.
+//! let axis = |n| Pyramid::new("bspline".parse().unwrap(), Boundary::Mirrored, n, 4);
+//! let tensor = Tensor::new(vec![axis(100)?, axis(70)?], Layout::NonStandard)?;
+//! let heights: Vec<f64> = (0..7000).map(|i| ((i / 70) as f64 * 0.1).sin()).collect();
+//! let mut wavelets = tensor.analyze(&heights)?;
+//! wavelets.keep_largest(300);
+//! let smooth = tensor.synthesize(&wavelets)?;
+//! assert!(heights.iter().zip(&smooth).all(|(a, b)| (a - b).abs() < 1e-2));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! family -> rung -> pyramid -> tensor -> decomposition
 
 mod axis;
 mod banded;
+mod cascade;
 mod coefficient;
 mod cubic;
 mod decomposition;
@@ -29,6 +51,7 @@ mod tables;
 mod tensor;
 pub mod tree;
 
+pub use cascade::cascade;
 pub use coefficient::{Coefficient, Scalar};
 pub use decomposition::{Block, Decomposition, FunctionNorms, Norms, Part};
 pub use family::{Boundary, Family, FamilyError, SplineFamily};
