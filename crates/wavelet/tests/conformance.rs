@@ -2,7 +2,8 @@
 //!
 //! The definition of a rung is a pair of sparse matrices; the fast passes are held against them here.
 
-use ondelette_wavelet::{Boundary, Family, Kind, Pyramid, Rung, levels_allowed};
+use ondelette_wavelet::exact::{ratio, to_f64};
+use ondelette_wavelet::{Boundary, Family, Kind, Pyramid, Rung, SplineFamily, SplineSpace, levels_allowed};
 
 /// Repeatable numbers in [-1, 1).
 fn numbers(n: usize, seed: u64) -> Vec<f64> {
@@ -138,4 +139,81 @@ conformance! {
     d16: "d16", Periodic, [2, 4, 64];
     d18: "d18", Periodic, [2, 4, 64];
     d20: "d20", Periodic, [2, 4, 6, 20, 64, 4096];
+}
+
+/// Moments `int psi t^k dt` of the finest wavelets, by exact moments of the finest functions.
+fn moments(family: SplineFamily, boundary: Boundary, len: usize, powers: u32) -> Vec<Vec<f64>> {
+    let space = SplineSpace::new(family, boundary, len).unwrap();
+    let pyramid = Pyramid::new(Family::Spline(family), boundary, len, 1).unwrap();
+    let rung = pyramid.rung(0);
+    let middle = space.spans() as i64 / 2;
+    let functions: Vec<Vec<f64>> = (0..len)
+        .map(|i| {
+            // About the middle, to keep powers small.
+            let f = space.function(i).transformed(&ratio(1, 1), &ratio(-middle, 1));
+            (0..powers).map(|k| to_f64(&f.moment(k))).collect()
+        })
+        .collect();
+    let columns = rung.synthesis().transposed();
+    (rung.smooth()..len)
+        .map(|j| (0..powers as usize).map(|k| columns.row(j).iter().map(|&(i, v)| v * functions[i][k]).sum()).collect())
+        .collect()
+}
+
+#[test]
+fn wavelets_have_their_vanishing_moments() {
+    for (family, reach) in [(SplineFamily::LINEAR, 3), (SplineFamily::CUBIC, 3), (SplineFamily::CUBIC6, 5)] {
+        let powers = family.vanishing_moments();
+        let all = moments(family, Boundary::Mirrored, 65, powers);
+        for (j, m) in all.iter().enumerate() {
+            assert!(m[0].abs() < 1e-12, "{family:?}: wavelet {j} of the mirrored space has a mean: {}", m[0]);
+            if (reach..all.len() - reach).contains(&j) {
+                assert!(
+                    m.iter().enumerate().all(|(k, x)| x.abs() < 1e-12 * 32.0_f64.powi(k as i32)),
+                    "{family:?} {j}: {m:?}"
+                );
+            }
+        }
+        // At the mirror only the first moment vanishes.
+        assert!(all[0][1].abs() > 1e-3, "{family:?}: {:?}", all[0]);
+    }
+    // The open basis: four everywhere, the ends included.
+    for (j, m) in moments(SplineFamily::CUBIC, Boundary::Open, 67, 4).iter().enumerate() {
+        assert!(m.iter().enumerate().all(|(k, x)| x.abs() < 1e-12 * 32.0_f64.powi(k as i32)), "open {j}: {m:?}");
+    }
+}
+
+#[test]
+fn boundary_moments_of_the_thesis_and_their_erratum() {
+    // First moments of the three left boundary wavelets of the mirrored cubic basis, in fine units about t = 0.
+    let space = SplineSpace::new(SplineFamily::CUBIC, Boundary::Mirrored, 65).unwrap();
+    let pyramid = Pyramid::new(Family::Spline(SplineFamily::CUBIC), Boundary::Mirrored, 65, 1).unwrap();
+    let columns = pyramid.rung(0).synthesis().transposed();
+    for (j, want) in [-9.0 / 40.0, 37.0 / 160.0, 1.0 / 96.0].into_iter().enumerate() {
+        let first: f64 = columns.row(33 + j).iter().map(|&(i, v)| v * to_f64(&space.function(i).moment(1))).sum();
+        let relative = (first / want).abs();
+        assert!(
+            (relative - 1.0).abs() < 1e-10 || (relative - 4.0).abs() < 1e-10,
+            "wavelet {j}: {first} against {want}"
+        );
+    }
+}
+
+#[test]
+fn levels_cost_a_constant_per_coefficient() {
+    for (family, boundary, most) in [
+        ("bspline", Boundary::Mirrored, 16.5),
+        ("bspline", Boundary::Open, 16.5),
+        ("bspline612", Boundary::Periodic, 40.0),
+        ("d20", Boundary::Periodic, 20.0),
+        ("m3", Boundary::Periodic, 6.0),
+    ] {
+        for len in [96, 960, 9600] {
+            let len = if boundary == Boundary::Open { len + 3 } else { len };
+            let pyramid = Pyramid::new(family.parse().unwrap(), boundary, len, 5).unwrap();
+            let entries: usize = (0..5).map(|i| pyramid.rung(i).synthesis().len()).sum();
+            // Levels halve: all together at most twice the finest.
+            assert!(entries as f64 <= 2.0 * most * len as f64, "{family} {boundary} {len}: {entries}");
+        }
+    }
 }
