@@ -155,7 +155,7 @@ fn wavelets(fine: &OpenKnots) -> Vec<Column> {
     let n = fine.spans();
     let coarse = fine.coarser();
     let uniform = fine.uniform_between(0, n);
-    if uniform && n % 2 == 0 && n >= 16 {
+    if uniform && n.is_multiple_of(2) && n >= 16 {
         let mut out: Vec<Column> = boundary_wavelets().map(|g| (0, g)).to_vec();
         out.extend((0..n / 2 - 6).map(|j| (2 * j + 3, interior_wavelet())));
         let right = boundary_wavelets().map(|mut g| {

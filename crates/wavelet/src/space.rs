@@ -82,7 +82,7 @@ impl SplineSpace {
         let fits = match boundary {
             Boundary::Open => family == SplineFamily::CUBIC && len >= 4,
             Boundary::Periodic => len >= 1,
-            Boundary::Mirrored => len >= 1 + usize::from(family.order() % 2 == 0),
+            Boundary::Mirrored => len > usize::from(family.order().is_multiple_of(2)),
         };
         if !fits {
             return Err(SpaceError::None { len, order: family.order(), boundary });

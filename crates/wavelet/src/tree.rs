@@ -214,7 +214,7 @@ fn monomial_legendre(j: u32, m: u32) -> BigRational {
     let mut sum = BigRational::zero();
     for k in 0..=m / 2 {
         let power = j + m - 2 * k;
-        if power % 2 == 0 {
+        if power.is_multiple_of(2) {
             let c = binomial(m, k) * binomial(2 * m - 2 * k, m) * ratio(2, i64::from(power) + 1);
             sum = if k % 2 == 0 { sum + c } else { sum - c };
         }
