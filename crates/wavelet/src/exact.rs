@@ -143,8 +143,8 @@ pub(crate) fn binomial(n: u32, k: u32) -> BigRational {
 /// The Cohen-Daubechies-Feauveau filters whose scaling function is the B-spline of order `n` (degree `n - 1`) and
 /// whose wavelet has `n_dual` vanishing moments. `(4, 4)` is A.1 of the thesis.
 ///
-/// h = 2 ((1+z)/2)^N and h~ = ((1+z)/2)^N~ sum_k C(K-1+k, k) y^k with y = (2 - z - 1/z)/4 and K = (N + N~)/2; then
-/// g[k] = (-1)^(k+1) h~[1-k] and g~[k] = (-1)^(k+1) h[1-k].
+/// `h = 2 ((1+z)/2)^N` and `h~ = ((1+z)/2)^N~ sum_k C(K-1+k, k) y^k` with `y = (2 - z - 1/z)/4`, `K = (N + N~)/2`;
+/// `g[k] = (-1)^(k+1) h~[1-k]` and `g~[k] = (-1)^(k+1) h[1-k]`.
 ///
 /// # Panics
 /// If `n + n_dual` is odd: no such family.

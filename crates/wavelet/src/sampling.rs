@@ -15,7 +15,7 @@ use crate::tree::TreeFamily;
 /// use ondelette_wavelet::{Boundary, Family, Pyramid, Sampling, SplineFamily};
 /// let axis = Pyramid::deepest(Family::Spline(SplineFamily::CUBIC), Boundary::Mirrored, 9)?;
 /// let sampling = Sampling::new(&axis)?;
-/// let mut data = vec![2.0; 9];
+/// let mut data = vec![2.0_f64; 9];
 /// sampling.to_coefficients(&mut data, 1);
 /// assert!(data.iter().all(|c| (c - 2.0).abs() < 1e-14));
 /// # Ok::<(), Box<dyn std::error::Error>>(())

@@ -217,3 +217,43 @@ fn levels_cost_a_constant_per_coefficient() {
         }
     }
 }
+
+/// Condition number of the synthesis of a rung, by power iterations on `S^T S` and on its inverse.
+fn condition(rung: &Rung) -> f64 {
+    let n = rung.fine();
+    let s = rung.smooth();
+    let root = |f: &dyn Fn(&[f64]) -> Vec<f64>| {
+        let mut x = numbers(n, 3);
+        let mut gain = 0.0;
+        for _ in 0..300 {
+            let y = f(&x);
+            gain = y.iter().map(|v| v * v).sum::<f64>().sqrt();
+            x = y.into_iter().map(|v| v / gain).collect();
+        }
+        gain.sqrt()
+    };
+    let up = |kind, x: &[f64]| {
+        let (mut a, mut b) = (vec![0.0; s], vec![0.0; n - s]);
+        rung.up(kind, x, &mut a, &mut b);
+        [a, b].concat()
+    };
+    let down = |kind, x: &[f64]| {
+        let mut f = vec![0.0; n];
+        rung.down(kind, &x[..s], &x[s..], &mut f);
+        f
+    };
+    let largest = root(&|x| up(Kind::Basis, &down(Kind::Coefficients, x)));
+    let inverse = root(&|x| up(Kind::Coefficients, &down(Kind::Basis, x)));
+    largest * inverse
+}
+
+#[test]
+fn open_levels_are_well_conditioned_at_any_length() {
+    for spans in (1..40).chain([64, 127, 128, 200, 333]) {
+        let pyramid = Pyramid::deepest("bspline".parse().unwrap(), Boundary::Open, spans + 3).unwrap();
+        for i in 0..pyramid.levels() {
+            let kappa = condition(pyramid.rung(i));
+            assert!(kappa < 6.6, "{spans} spans, level {i}: condition {kappa}");
+        }
+    }
+}
