@@ -50,8 +50,8 @@ fn time<S: ondelette_wavelet::Coefficient<Scalar = S> + Scalar>(case: &Case, run
     par::with_threads(1, || {
         let start = Instant::now();
         let mut best = (f64::INFINITY, f64::INFINITY);
-        // The kernel's account of CPU time is as coarse as its tick: repeat short transforms to 50 ms or so.
-        let repeat = (1_usize << 24).div_ceil(tensor.len());
+        // The kernel's account of CPU time is as coarse as its tick: repeat until ticks do not show.
+        let repeat = (3_usize << 24).div_ceil(tensor.len());
         for _ in 0..runs {
             let t0 = cpu_seconds(start);
             for _ in 0..repeat {

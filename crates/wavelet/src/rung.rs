@@ -148,6 +148,24 @@ impl Rung {
         }
     }
 
+    /// [`Rung::up`] on plain numbers.
+    pub(crate) fn up_flat<S: Scalar>(&self, kind: Kind, fine: &[S], smooth: &mut [S], detail: &mut [S]) {
+        match &self.engine {
+            Engine::Lifted(l) => l.up(kind).up(fine, smooth, detail, &mut Scratch::default()),
+            Engine::Block(b) => b.up(kind, fine, smooth, detail, 1),
+            Engine::Solved(b) => b.up(kind, fine, smooth, detail, 1),
+        }
+    }
+
+    /// [`Rung::down`] on plain numbers.
+    pub(crate) fn down_flat<S: Scalar>(&self, kind: Kind, smooth: &[S], detail: &[S], fine: &mut [S]) {
+        match &self.engine {
+            Engine::Lifted(l) => l.down(kind).down(smooth, detail, fine, &mut Scratch::default()),
+            Engine::Block(b) => b.down(kind, smooth, detail, fine, 1),
+            Engine::Solved(b) => b.down(kind, smooth, detail, fine, 1),
+        }
+    }
+
     /// The synthesis matrix: `fine = S [smooth; detail]`, the definition of the rung.
     pub fn synthesis(&self) -> Sparse {
         match &self.engine {

@@ -276,7 +276,10 @@ impl Tensor {
             let (now, coarse) = work.pair(levels - level, coarse_shape.iter().product());
             let now = if level + 1 == levels { from } else { now };
             let engines = self.axes.iter().map(|a| &a.rung(level).engine).collect::<Vec<_>>();
-            if let [Engine::Lifted(a), Engine::Lifted(b)] = engines[..] {
+            if let [axis] = &self.axes[..] {
+                let rung = axis.rung(level);
+                rung.up_flat(kind, &now[..rung.fine()], coarse, &mut to[rung.smooth()..rung.fine()]);
+            } else if let [Engine::Lifted(a), Engine::Lifted(b)] = engines[..] {
                 picture::up_picture([&a.up(kind), &b.up(kind)], now, coarse, to, shape[1]);
             } else {
                 let fine_shape = self.level_shape(level + 1);
@@ -309,7 +312,10 @@ impl Tensor {
             let fine = if last { &mut *to } else { fine };
             let coarse = &coarse[..coarse_shape.iter().product()];
             let engines = self.axes.iter().map(|a| &a.rung(level).engine).collect::<Vec<_>>();
-            if let [Engine::Lifted(a), Engine::Lifted(b)] = engines[..] {
+            if let [axis] = &self.axes[..] {
+                let rung = axis.rung(level);
+                rung.down_flat(kind, coarse, &from[rung.smooth()..rung.fine()], fine);
+            } else if let [Engine::Lifted(a), Engine::Lifted(b)] = engines[..] {
                 picture::down_picture([&a.down(kind), &b.down(kind)], coarse, from, shape[1], fine);
             } else {
                 copy_box(from, &shape, fine, &fine_shape, &fine_shape);
