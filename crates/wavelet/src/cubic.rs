@@ -65,16 +65,24 @@ impl<S: Scalar> Cubic<S> {
         }
         let last = &seg[2 * (len + 3)..];
         s1[len + 3] = last[1] + a * (last[0] + last[2]);
-        for ((o, x), y) in d1[..len + 3].iter_mut().zip(&s1[..len + 3]).zip(&s1[1..]) {
-            *o += b * (*x + *y);
+        let step = |o: &mut [S], s: &[S]| {
+            for ((o, x), y) in o.iter_mut().zip(s).zip(&s[1..]) {
+                *o += b * (*x + *y);
+            }
+        };
+        step(&mut d1[..2], s1);
+        step(&mut d1[2 + len..3 + len], &s1[2 + len..]);
+        let nd = detail.len();
+        for (((o, x), y), t) in d1[2..2 + nd].iter_mut().zip(&s1[2..2 + nd]).zip(&s1[3..3 + nd]).zip(detail.iter_mut())
+        {
+            let v = *o + b * (*x + *y);
+            *o = v;
+            *t = gd * v;
         }
-        let (d0, d2, d3) = (&d1[..len], &d1[2..len + 2], &d1[3..len + 3]);
-        let d1_ = &d1[1..len + 1];
-        for (((((s, x), p0), p1), p2), p3) in smooth.iter_mut().zip(&s1[2..len + 2]).zip(d0).zip(d1_).zip(d2).zip(d3) {
+        step(&mut d1[2 + nd..2 + len], &s1[2 + nd..]);
+        let (p0, p1, p2, p3) = (&d1[..len], &d1[1..len + 1], &d1[2..len + 2], &d1[3..len + 3]);
+        for (((((s, x), p0), p1), p2), p3) in smooth.iter_mut().zip(&s1[2..len + 2]).zip(p0).zip(p1).zip(p2).zip(p3) {
             *s = gs * (*x + c * (*p0 + *p3) + d * (*p1 + *p2));
-        }
-        for (t, x) in detail.iter_mut().zip(d2) {
-            *t = gd * *x;
         }
     }
 
