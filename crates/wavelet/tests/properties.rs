@@ -91,6 +91,31 @@ proptest! {
     }
 
     #[test]
+    fn a_value_that_is_not_finite_is_found_in_grids(
+        (family, boundary) in any_family(),
+        rows in 1_usize..40,
+        cols in 1_usize..40,
+        at in 0_usize..1600,
+        infinite in any::<bool>(),
+        standard in any::<bool>(),
+    ) {
+        let levels = [rows, cols].map(|n| levels_allowed(family, boundary, n));
+        let [Ok(a), Ok(b)] = levels else { return Ok(()) };
+        let axis = |n| Pyramid::new(family, boundary, n, a.min(b)).expect("allowed");
+        let layout = if standard { Layout::Standard } else { Layout::NonStandard };
+        let tensor = Tensor::new(vec![axis(rows), axis(cols)], layout).expect("equal levels");
+        let mut x = vec![1.0_f32; rows * cols];
+        let at = at % x.len();
+        x[at] = if infinite { f32::INFINITY } else { f32::NAN };
+        for kind in [Kind::Coefficients, Kind::Basis] {
+            match tensor.up(kind, &x) {
+                Err(TransformError::NotFinite { index, .. }) => prop_assert_eq!(index, at),
+                other => prop_assert!(false, "{family} {boundary} {rows}x{cols} {kind:?}: {:?}", other.map(|d| d.norms())),
+            }
+        }
+    }
+
+    #[test]
     fn too_many_levels_are_refused((family, boundary) in any_family(), len in 0_usize..200, more in 1_usize..70) {
         match levels_allowed(family, boundary, len) {
             Ok(most) => {
