@@ -29,6 +29,8 @@ pub(crate) enum Command {
     Probe(ProbeArgs),
     /// What is in a scene file
     Info(InfoArgs),
+    /// Transform arrays and pictures into a wavelet basis and back
+    Transform(crate::transform::TransformArgs),
 }
 
 #[derive(Debug, clap::Args)]

@@ -9,6 +9,7 @@ mod plan;
 mod progress;
 mod report;
 mod run;
+mod transform;
 
 use args::{Args, Command};
 use clap::Parser;
@@ -32,5 +33,6 @@ fn dispatch(command: Command) -> Result<Outcome, Refusal> {
         Command::Light(args) => run::light::run(plan::light::LightPlan::new(&args)?),
         Command::Probe(args) => run::probe::run(&args),
         Command::Info(args) => run::info::run(&args),
+        Command::Transform(args) => transform::run(&args).map(|()| Outcome::Done).map_err(Refusal::new),
     }
 }

@@ -22,6 +22,18 @@ pub fn for_each_chunk<T: Send>(data: &mut [T], chunk: usize, f: impl Fn(usize, &
     data.par_chunks_mut(chunk).enumerate().for_each(|(i, c)| f(i, c));
 }
 
+/// Runs `f` on every task; tasks own what they write, so their order cannot matter.
+///
+/// ```
+/// let mut halves = [1, 2, 3, 4];
+/// let tasks: Vec<&mut [i32]> = halves.chunks_mut(2).collect();
+/// ondelette_numerics::par::for_each(tasks, |half| half.reverse());
+/// assert_eq!(halves, [2, 1, 4, 3]);
+/// ```
+pub fn for_each<T: Send>(tasks: Vec<T>, f: impl Fn(T) + Sync) {
+    tasks.into_par_iter().for_each(&f);
+}
+
 /// Sum of `f(i)` for `i` in `0..n`: partial sums of 4096 terms, added in order.
 ///
 /// ```
