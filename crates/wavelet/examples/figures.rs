@@ -25,7 +25,8 @@ fn svg(panels: &[Panel]) -> String {
     let (width, height, gap) = (640.0, 110.0, 34.0);
     let total = panels.len() as f64 * (height + gap) + 10.0;
     let mut out = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {total}\" font-family=\"sans-serif\" font-size=\"13\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n"
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {total}\" font-family=\"sans-serif\" \
+         font-size=\"13\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n"
     );
     for (i, panel) in panels.iter().enumerate() {
         let top = 24.0 + i as f64 * (height + gap);

@@ -1,7 +1,7 @@
 //! One rung along one axis of a box.
 //!
-//! A box is `outer x n x inner`, row-major. Rows (`inner = 1`) run block by block, other axes as sweeps over rows. Bands
-//! of rows are independent tasks.
+//! A box is `outer x n x inner`, row-major. Rows (`inner = 1`) run block by block, other axes as sweeps over rows.
+//! Bands of rows are independent tasks.
 
 use crate::coefficient::Scalar;
 use crate::extension::Ends;

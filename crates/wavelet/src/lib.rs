@@ -3,8 +3,8 @@
 //! The ladder: a [`Family`] with a [`Boundary`] gives nested spaces; a [`Rung`] joins two of them with four verbs; a
 //! [`Pyramid`] climbs one axis; a [`Tensor`] climbs grids and returns a [`Decomposition`] that knows its layout.
 //! [`SplineSpace`] and [`Piecewise`] say what coefficients mean as functions, [`gram`] integrates them,
-//! [`cell`] has the two-dimensional cells that hierarchical operators stand on; [`NonStandardOperator`] holds operators in wavelets. Tables are exact rationals ([`exact`]); every inverse and
-//! transpose is derived from them.
+//! [`cell`] has the two-dimensional cells that hierarchical operators stand on; [`NonStandardOperator`] holds operators
+//! in wavelets. Tables are exact rationals ([`exact`]); every inverse and transpose is derived from them.
 //!
 //! ```
 //! use ondelette_wavelet::{Boundary, Layout, Pyramid, Tensor};

@@ -110,7 +110,10 @@ proptest! {
         for kind in [Kind::Coefficients, Kind::Basis] {
             match tensor.up(kind, &x) {
                 Err(TransformError::NotFinite { index, .. }) => prop_assert_eq!(index, at),
-                other => prop_assert!(false, "{family} {boundary} {rows}x{cols} {kind:?}: {:?}", other.map(|d| d.norms())),
+                other => {
+                    let norms = other.map(|d| d.norms());
+                    prop_assert!(false, "{family} {boundary} {rows}x{cols} {kind:?}: {norms:?}");
+                }
             }
         }
     }
