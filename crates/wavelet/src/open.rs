@@ -78,8 +78,10 @@ impl OpenKnots {
         functions.iter().map(|f| functions.iter().map(|g| f.inner(g)).collect()).collect()
     }
 
-    fn uniform_between(&self, from: usize, to: usize) -> bool {
-        (from..to).all(|i| self.breaks[i + 1] - self.breaks[i] == self.breaks[1] - self.breaks[0])
+    /// Leading spans as wide as the first.
+    fn uniform_spans(&self) -> usize {
+        let width = self.breaks[1] - self.breaks[0];
+        self.breaks.windows(2).take_while(|w| w[1] - w[0] == width).count()
     }
 
     /// Coefficients of coarse B-spline `k` in the fine ones: `(first fine index, values)`.
@@ -154,8 +156,8 @@ pub fn boundary_wavelets() -> [Vec<BigRational>; 3] {
 fn wavelets(fine: &OpenKnots) -> Vec<Column> {
     let n = fine.spans();
     let coarse = fine.coarser();
-    let uniform = fine.uniform_between(0, n);
-    if uniform && n.is_multiple_of(2) && n >= 16 {
+    let uniform = fine.uniform_spans();
+    if uniform == n && n.is_multiple_of(2) && n >= 16 {
         let mut out: Vec<Column> = boundary_wavelets().map(|g| (0, g)).to_vec();
         out.extend((0..n / 2 - 6).map(|j| (2 * j + 3, interior_wavelet())));
         let right = boundary_wavelets().map(|mut g| {
@@ -184,7 +186,7 @@ fn wavelets(fine: &OpenKnots) -> Vec<Column> {
             continue;
         }
         // Interior of uniform knots: the known wavelet.
-        if s >= 3 && s % 2 == 1 && s + 11 <= total - 3 && fine.uniform_between(0, s + 11) && s + 14 <= n {
+        if s >= 3 && s % 2 == 1 && s + 14 <= n && s + 11 <= uniform {
             out.push((s, interior_wavelet()));
             continue;
         }
@@ -253,8 +255,9 @@ impl Solved {
         let (n, m) = (fine.spans() + 3, coarse.spans() + 3);
         let mut all: Vec<(usize, Vec<f64>)> = Vec::with_capacity(n);
         let inner = [1.0, 4.0, 6.0, 4.0, 1.0].map(|x| x / 8.0).to_vec();
+        let uniform = fine.uniform_spans();
         for k in 0..m {
-            let plain = k >= 3 && 2 * k + 3 <= fine.spans() && fine.uniform_between(0, (2 * k + 3).min(fine.spans()));
+            let plain = k >= 3 && 2 * k + 3 <= uniform;
             if plain {
                 all.push((2 * k - 3, inner.clone()));
             } else {
