@@ -1,10 +1,10 @@
 //! Hierarchical compression of integral operators with tree wavelets (thesis 4.2 to 4.5), for any kernel.
 //!
 //! [`cell`] (a dyadic piece of a domain) -> [`forest`] (the tree of cells over each root domain) -> [`kernel`] (what is
-//! integrated) -> [`mod@couple`] (one block of the operator, with what its own test samples say of its error) -> [`links`]
-//! (all blocks) -> [`estimate`] (where the error is, seen by an oracle that knows the magnitudes at both ends) ->
-//! [`refine`] (ProjectKernel, second form: links replaced by links between children) -> [`transport`] (pull, gather,
-//! push).
+//! integrated) -> [`mod@couple`] (one block of the operator, with what its own test samples say of its error) ->
+//! [`links`] (all blocks) -> [`estimate`] (where the error is, seen by an oracle that knows the magnitudes at both
+//! ends) -> [`refine`] (ProjectKernel, second form: links replaced by links between children) -> [`transport`] (pull,
+//! gather, push).
 //!
 //! The approximate operator is the congruence P^T M P: pull P takes finest coefficients to all levels, the links M join
 //! equal or unequal levels, push P^T brings the result down. The thesis splits both ends of a link; splitting one end
