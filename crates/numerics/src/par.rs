@@ -34,23 +34,6 @@ pub fn for_each<T: Send>(tasks: Vec<T>, f: impl Fn(T) + Sync) {
     tasks.into_par_iter().for_each(&f);
 }
 
-/// Sum of `f(i)` for `i` in `0..n`: partial sums of 4096 terms, added in order.
-///
-/// ```
-/// assert_eq!(ondelette_numerics::par::sum(5, |i| i as f64), 10.0);
-/// ```
-pub fn sum(n: usize, f: impl Fn(usize) -> f64 + Sync) -> f64 {
-    const CHUNK: usize = 4096;
-    if n <= CHUNK {
-        return (0..n).map(f).fold(0.0, |a, b| a + b);
-    }
-    let partial: Vec<f64> = (0..n.div_ceil(CHUNK))
-        .into_par_iter()
-        .map(|c| (c * CHUNK..n.min((c + 1) * CHUNK)).map(&f).fold(0.0, |a, b| a + b))
-        .collect();
-    partial.into_iter().fold(0.0, |a, b| a + b)
-}
-
 /// Runs `f` with exactly `threads` worker threads (0: as many as the machine has).
 ///
 /// # Errors
