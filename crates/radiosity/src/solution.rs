@@ -95,8 +95,8 @@ impl Solution {
 
     /// Irradiance at side-local coordinates, in the scene's irradiance unit. Not clamped.
     ///
-    /// On a common edge of elements, where the piecewise polynomial may jump, the mean of what stands on its sides (of four
-    /// points close by).
+    /// On a common edge of elements, where the piecewise polynomial may jump, the mean of what stands on its sides (of
+    /// four points close by).
     pub fn irradiance(&self, side: usize, at: [f64; 2]) -> Rgb {
         let (leaf, x) = self.forest.locate(side, at);
         let cell = &self.forest.node(leaf).cell;
