@@ -31,27 +31,27 @@ impl SideFrame {
 
     /// Whether the projection of a point on the side's plane lies on the side.
     pub fn holds(&self, point: DVec3) -> bool {
+        let [s, t] = self.local(point);
+        let far = if self.shape == CellShape::Triangle { s + t } else { s.max(t) };
+        s >= 0.0 && t >= 0.0 && far <= 1.0
+    }
+
+    /// Side-local coordinates of the projection of a point on the side's plane.
+    fn local(&self, point: DVec3) -> [f64; 2] {
         let [u, v] = self.edges;
         let d = point - self.origin;
         let n = u.cross(v);
         let inverse = 1.0 / n.length_squared();
-        let [s, t] = [v.cross(n).dot(d) * inverse, n.cross(u).dot(d) * inverse];
-        let triangle = self.shape == CellShape::Triangle;
-        s >= 0.0 && t >= 0.0 && if triangle { s + t <= 1.0 } else { s <= 1.0 && t <= 1.0 }
+        [v.cross(n).dot(d) * inverse, n.cross(u).dot(d) * inverse]
     }
 
     /// Side-local coordinates of the point of the side that is closest to `point`.
     pub fn closest(&self, point: DVec3) -> [f64; 2] {
-        let [u, v] = self.edges;
-        let d = point - self.origin;
-        let n = u.cross(v);
-        let inverse = 1.0 / n.length_squared();
-        let [s, t] = [v.cross(n).dot(d) * inverse, n.cross(u).dot(d) * inverse];
-        let triangle = self.shape == CellShape::Triangle;
-        let inside = s >= 0.0 && t >= 0.0 && if triangle { s + t <= 1.0 } else { s <= 1.0 && t <= 1.0 };
-        if inside {
-            return [s, t];
+        if self.holds(point) {
+            return self.local(point);
         }
+        let [u, v] = self.edges;
+        let triangle = self.shape == CellShape::Triangle;
         // the closest point of each edge, in local coordinates
         let edges: &[[[f64; 2]; 2]] = if triangle {
             &[[[0.0, 0.0], [1.0, 0.0]], [[1.0, 0.0], [0.0, 1.0]], [[0.0, 1.0], [0.0, 0.0]]]
