@@ -3,15 +3,26 @@
 use serde_json::Value;
 
 /// Our crates, lowest first, each with those of ours that it may use. Nothing may use an application or xtask.
-const OURS: [(&str, &[&str]); 7] = [
+const OURS: [(&str, &[&str]); 8] = [
     ("ondelette-numerics", &[]),
     ("ondelette-wavelet", &["ondelette-numerics"]),
     ("ondelette-compress", &["ondelette-numerics", "ondelette-wavelet"]),
     ("ondelette-radiosity", &["ondelette-numerics", "ondelette-wavelet", "ondelette-compress"]),
-    ("ondelette-io", &["ondelette-numerics", "ondelette-wavelet", "ondelette-compress", "ondelette-radiosity"]),
+    ("ondelette-modeling", &["ondelette-numerics", "ondelette-wavelet"]),
+    (
+        "ondelette-io",
+        &["ondelette-numerics", "ondelette-wavelet", "ondelette-compress", "ondelette-radiosity", "ondelette-modeling"],
+    ),
     (
         "ondelette",
-        &["ondelette-numerics", "ondelette-wavelet", "ondelette-compress", "ondelette-radiosity", "ondelette-io"],
+        &[
+            "ondelette-numerics",
+            "ondelette-wavelet",
+            "ondelette-compress",
+            "ondelette-radiosity",
+            "ondelette-modeling",
+            "ondelette-io",
+        ],
     ),
     ("xtask", &[]),
 ];
