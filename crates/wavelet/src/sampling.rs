@@ -1,6 +1,7 @@
 //! Between samples of a function and the finest coefficients of a pyramid: the prefilter and its inverse.
 
 use crate::coefficient::Scalar;
+use crate::dense::inverse;
 use crate::family::{Boundary, Family, SplineFamily};
 use crate::pyramid::Pyramid;
 use crate::space::{Cyclic, SpaceError, SplineSpace};
@@ -125,30 +126,4 @@ fn cells<S: Scalar>(slab: &mut [S], order: usize, matrix: &[f64], inner: usize) 
             }
         }
     }
-}
-
-/// Inverse of a small regular matrix.
-fn inverse(matrix: &[f64], n: usize) -> Vec<f64> {
-    let mut a = matrix.to_vec();
-    let mut out: Vec<f64> = (0..n * n).map(|i| if i / n == i % n { 1.0 } else { 0.0 }).collect();
-    for c in 0..n {
-        let p = (c..n).max_by(|&x, &y| a[x * n + c].abs().total_cmp(&a[y * n + c].abs())).unwrap_or(c);
-        for k in 0..n {
-            a.swap(c * n + k, p * n + k);
-            out.swap(c * n + k, p * n + k);
-        }
-        let d = a[c * n + c];
-        for k in 0..n {
-            a[c * n + k] /= d;
-            out[c * n + k] /= d;
-        }
-        for r in (0..n).filter(|&r| r != c) {
-            let f = a[r * n + c];
-            for k in 0..n {
-                a[r * n + k] -= f * a[c * n + k];
-                out[r * n + k] -= f * out[c * n + k];
-            }
-        }
-    }
-    out
 }

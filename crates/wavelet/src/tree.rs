@@ -5,6 +5,7 @@
 //! from the polynomials projected on the halves, flatlets (Eq. 115) from polynomials averaged over `2M` boxes.
 
 use crate::exact::{BigRational, binomial, ratio, to_f64};
+use crate::polynomials::legendre;
 use num_traits::{One, Signed, Zero};
 
 /// What the functions of a cell are.
@@ -36,7 +37,7 @@ pub struct TreeFamily {
 }
 
 /// An order outside what a tree family offers.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{family} order {order}: choose 1 to {limit}")]
 pub struct OrderError {
     /// The family asked for.
@@ -128,15 +129,7 @@ impl TreeFamily {
         match self.kind {
             TreeKind::Haar => out[0] = 1.0,
             TreeKind::Flatlet => out[((x * self.order as f64) as usize).min(self.order - 1)] = 1.0,
-            TreeKind::Multiwavelet => {
-                let y = 2.0 * x - 1.0;
-                let (mut before, mut now) = (0.0, 1.0);
-                for (m, v) in out.iter_mut().enumerate() {
-                    let m = m as f64;
-                    *v = now * (2.0 * m + 1.0).sqrt();
-                    (before, now) = (now, ((2.0 * m + 1.0) * y * now - m * before) / (m + 1.0));
-                }
-            }
+            TreeKind::Multiwavelet => out.copy_from_slice(&legendre(x)[..self.order]),
         }
     }
 }
