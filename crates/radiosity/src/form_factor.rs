@@ -67,14 +67,19 @@ impl Polygon {
 /// assert!((f - 0.239456470460774).abs() < 1e-14);
 /// ```
 pub fn point_to_polygon(x: DVec3, n: DVec3, polygon: &Polygon) -> f64 {
-    let corners = polygon.corners();
+    let mut relative = polygon.corners;
+    relative[..polygon.len].iter_mut().for_each(|c| *c -= x);
+    cone_factor(n, &relative[..polygon.len])
+}
+
+/// The same for corners relative to the point.
+pub(crate) fn cone_factor(n: DVec3, corners: &[DVec3]) -> f64 {
     if corners.len() < 3 {
         return 0.0;
     }
     let mut sum = 0.0;
-    let mut a = corners[corners.len() - 1] - x;
-    for &corner in corners {
-        let b = corner - x;
+    let mut a = corners[corners.len() - 1];
+    for &b in corners {
         let cross = a.cross(b);
         let sine = cross.length();
         if sine > 0.0 {

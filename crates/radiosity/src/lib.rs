@@ -11,6 +11,7 @@ pub mod settings;
 pub mod solution;
 pub mod solver;
 pub mod view;
+pub mod visible;
 
 pub use rgb::Rgb;
 pub use scene::Scene;

@@ -146,6 +146,11 @@ impl Occluders {
         1e-7 * self.scale
     }
 
+    /// Corners of a patch, counter-clockwise from its front.
+    pub fn corners(&self, patch: u32) -> &[DVec3] {
+        &self.corners[patch as usize]
+    }
+
     /// Whether anything but the two given patches lies between two points.
     pub fn blocked(&self, from: DVec3, to: DVec3, except: [u32; 2]) -> bool {
         let d = to - from;
