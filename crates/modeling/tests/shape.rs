@@ -31,6 +31,16 @@ fn surface(boundaries: [Boundary; 2], spans: [usize; 2], dim: usize, seed: u64) 
     Surface::new(axes, dim, noise(axes[0].len() * axes[1].len(), seed)).unwrap()
 }
 
+/// A rough sheet over [-1, 1]^2.
+fn hills(boundaries: [Boundary; 2], spans: [usize; 2], seed: u64) -> Surface {
+    let axes = [axis(boundaries[0], spans[0]), axis(boundaries[1], spans[1])];
+    let [n, m] = axes.map(|a| a.len());
+    let grid = |k: usize, n: usize| 2.0 * k as f64 / (n - 1) as f64 - 1.0;
+    let points = noise(n * m, seed).into_iter().enumerate();
+    let points = points.map(|(k, p)| [grid(k / m, n) + 0.2 * p[0], grid(k % m, m) + 0.2 * p[1], 0.6 * p[2]]);
+    Surface::new(axes, 3, points.collect()).unwrap()
+}
+
 fn apart(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|c| (a[c] - b[c]).powi(2)).sum::<f64>().sqrt()
 }
@@ -250,7 +260,7 @@ proptest! {
         for t in steps([-1.0, 2.5], 3000) {
             prop_assert!(apart(curve.point(t), to) >= near.distance - 1e-12, "curve, t {}", t);
         }
-        let surface = surface([ALL[b], ALL[(b + 1) % 3]], [spans, 4], 3, seed);
+        let surface = hills([ALL[b], ALL[(b + 1) % 3]], [spans, 4], seed);
         let near = surface.closest(to);
         for s in steps([-1.0, 2.5], 60) {
             for t in steps([-1.0, 2.5], 60) {

@@ -139,8 +139,9 @@ pub(super) fn on_surface<S: ParametricSurface + ?Sized>(surface: &S, to: [f64; 3
         }
         for k in 0..=SEEDS_ON_SURFACE {
             for l in 0..=SEEDS_ON_SURFACE {
-                let near = |k: usize| k.saturating_sub(1)..=(k + 1).min(SEEDS_ON_SURFACE);
-                if near(k).all(|a| near(l).all(|b| grid[k][l] <= grid[a][b])) {
+                let near = |k: usize| [k.saturating_sub(1), (k + 1).min(SEEDS_ON_SURFACE)];
+                let here = grid[k][l];
+                if near(k).iter().all(|&a| here <= grid[a][l]) || near(l).iter().all(|&b| here <= grid[k][b]) {
                     let found = settle(surface, to, at(s(k), t(l)));
                     if found.distance < best.distance {
                         best = found;
