@@ -1,9 +1,10 @@
 //! Uniform cubic B-spline curves.
 
 use super::geometry::{CurveJet, ParametricCurve, ball};
-use super::span::{self, Span};
+use super::span;
 use super::vector::{V, length};
 use crate::axis::Axis;
+use crate::basis::{self, Taps};
 use ondelette_wavelet::Boundary;
 
 /// A uniform cubic B-spline curve of 1 (a function of the parameter), 2 or 3 coordinates.
@@ -124,10 +125,7 @@ impl Curve {
 
     /// The derivative of the given order by `t`, in domain units; 0 from order 4 on.
     pub fn derivative(&self, t: f64, order: usize) -> [f64; 3] {
-        let (span, u) = Span::at(&self.axis, self.axis.to_knots(t));
-        let unit = self.axis.density().powi(order as i32);
-        let weights = span.weights(u, order).map(|w| w * unit);
-        span::combine(&span::Row { points: span.points(), weights }, &self.points)
+        span::combine(&basis::taps(&self.axis, t, order), &self.points)
     }
 
     /// The same curve with `2^levels` times as many spans. Linear time.
@@ -147,7 +145,7 @@ impl Curve {
         }
     }
 
-    fn along(&self, axis: Axis, rows: &[span::Row]) -> Curve {
+    fn along(&self, axis: Axis, rows: &[Taps]) -> Curve {
         Curve { axis, dim: self.dim, points: rows.iter().map(|r| span::combine(r, &self.points)).collect() }
     }
 
@@ -156,7 +154,7 @@ impl Curve {
     /// # Panics
     /// If there is no such span.
     pub fn bezier(&self, i: usize) -> [[f64; 3]; 4] {
-        bezier_rows(&self.axis, i).map(|row| span::combine(&row, &self.points))
+        span::bezier(&self.axis, i).map(|row| span::combine(&row, &self.points))
     }
 
     /// Bezier points of span `i` in space: of the graph if there is one coordinate.
@@ -180,14 +178,6 @@ pub(crate) fn open_axis(axis: &Axis) -> Option<Axis> {
         return None;
     }
     Axis::new(Boundary::Open, axis.spans(), axis.domain()).ok()
-}
-
-/// The rows that make the Bezier points of a span.
-pub(crate) fn bezier_rows(axis: &Axis, i: usize) -> [span::Row; 4] {
-    let span = Span::new(axis, i);
-    let (a, b) = (i as f64, i as f64 + 1.0);
-    [[a, a, a], [a, a, b], [a, b, b], [b, b, b]]
-        .map(|u| span::Row { points: span.points(), weights: span.blossom_weights(u) })
 }
 
 impl ParametricCurve for Curve {

@@ -1,10 +1,11 @@
 //! Uniform bicubic tensor B-spline surfaces.
 
-use super::curve::{MOST_POINTS, ShapeError, bezier_rows, checked, finer, open_axis};
+use super::curve::{MOST_POINTS, ShapeError, checked, finer, open_axis};
 use super::geometry::{ParametricSurface, SurfaceJet, ball};
-use super::span::{self, Row, Span};
+use super::span;
 use super::vector::{V, length};
 use crate::axis::Axis;
+use crate::basis::{self, Taps};
 use ondelette_wavelet::Boundary;
 
 /// A uniform bicubic B-spline surface of 1 (heights over the domain), 2 or 3 coordinates, with an own boundary and
@@ -68,17 +69,14 @@ impl Surface {
         self.combine(&rows[0], &rows[1])
     }
 
-    fn row(&self, axis: usize, t: f64, order: usize) -> Row {
-        let a = &self.axes[axis];
-        let (span, u) = Span::at(a, a.to_knots(t));
-        let unit = a.density().powi(order as i32);
-        Row { points: span.points(), weights: span.weights(u, order).map(|w| w * unit) }
+    fn row(&self, axis: usize, t: f64, order: usize) -> Taps {
+        basis::taps(&self.axes[axis], t, order)
     }
 
-    fn combine(&self, s: &Row, t: &Row) -> V {
+    fn combine(&self, s: &Taps, t: &Taps) -> V {
         let width = self.axes[1].len();
         let mut out = [0.0; 3];
-        for (&i, &a) in s.points.iter().zip(&s.weights) {
+        for (&i, &a) in s.index.iter().zip(&s.values) {
             let inner = span::combine(t, &self.points[i * width..][..width]);
             for c in 0..3 {
                 out[c] += a * inner[c];
@@ -111,7 +109,7 @@ impl Surface {
         self.along(axes, &rows)
     }
 
-    fn along(&self, axes: [Axis; 2], rows: &[Vec<Row>; 2]) -> Surface {
+    fn along(&self, axes: [Axis; 2], rows: &[Vec<Taps>; 2]) -> Surface {
         Surface { axes, dim: self.dim, points: combine_grid(&self.points, self.axes[1].len(), rows) }
     }
 
@@ -120,7 +118,7 @@ impl Surface {
     /// # Panics
     /// If there is no such patch.
     pub fn bezier(&self, i: usize, j: usize) -> [[[f64; 3]; 4]; 4] {
-        let (rows, columns) = (bezier_rows(&self.axes[0], i), bezier_rows(&self.axes[1], j));
+        let (rows, columns) = (span::bezier(&self.axes[0], i), span::bezier(&self.axes[1], j));
         rows.map(|r| columns.map(|c| self.combine(&r, &c)))
     }
 
@@ -148,7 +146,7 @@ impl Surface {
 }
 
 /// Applies rows along both directions of a row-major grid.
-pub(crate) fn combine_grid(points: &[V], width: usize, rows: &[Vec<Row>; 2]) -> Vec<V> {
+pub(crate) fn combine_grid(points: &[V], width: usize, rows: &[Vec<Taps>; 2]) -> Vec<V> {
     let mut half = Vec::with_capacity(points.len() / width * rows[1].len());
     for line in points.chunks(width) {
         half.extend(rows[1].iter().map(|r| span::combine(r, line)));
@@ -158,7 +156,7 @@ pub(crate) fn combine_grid(points: &[V], width: usize, rows: &[Vec<Row>; 2]) -> 
     for row in &rows[0] {
         out.extend((0..width).map(|j| {
             let mut sum = [0.0; 3];
-            for (&i, &w) in row.points.iter().zip(&row.weights) {
+            for (&i, &w) in row.index.iter().zip(&row.values) {
                 let p = half[i * width + j];
                 for c in 0..3 {
                     sum[c] += w * p[c];
