@@ -1,10 +1,11 @@
 //! Curves and surfaces: multiresolution editing and variational design of B-splines (thesis chapters 5 to 7).
 //!
 //! [`axis`] says where a spline lives: boundary, spans, domain; [`basis`] which functions are alive at a parameter.
-//! [`shape`]: curves and surfaces, what they mean as geometry.
+//! [`shape`]: curves and surfaces, what they mean as geometry; [`edit`]: handles on every level.
 
 pub mod axis;
 pub mod basis;
+pub mod edit;
 pub mod shape;
 
 pub use axis::{Axis, AxisError};

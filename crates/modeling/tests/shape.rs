@@ -167,6 +167,25 @@ fn a_circle_is_round_and_a_sphere_curved_as_it_should_be() {
 }
 
 #[test]
+fn heights_are_the_graph_they_mean() {
+    for (a, b) in [(Open, Mirrored), (Periodic, Open), (Mirrored, Periodic)] {
+        let field = surface([a, b], [6, 5], 1, 37);
+        let graph = field.in_space();
+        assert_eq!(graph.dim(), 3);
+        for s in steps([-1.0, 2.5], 11) {
+            for t in steps([-1.0, 2.5], 11) {
+                // the end of a period is its start
+                let (s, t) = (s.min(2.5 - 1e-12), t.min(2.5 - 1e-12));
+                assert!(apart(graph.point(s, t), [s, t, field.point(s, t)[0]]) < 1e-12);
+                assert!(apart(graph.point(s, t), field.jet(s, t).point) < 1e-12);
+            }
+        }
+        let line = curve(a, 6, 1, 41);
+        assert!(apart(line.in_space().point(0.3), [0.3, line.point(0.3)[0], 0.0]) < 1e-13);
+    }
+}
+
+#[test]
 fn boxes_are_tight() {
     for boundary in ALL {
         let curve = curve(boundary, 9, 3, 17);

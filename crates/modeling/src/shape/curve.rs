@@ -145,6 +145,20 @@ impl Curve {
         }
     }
 
+    /// The curve in space that [`ParametricCurve`] sees, in the open basis: for one coordinate the graph (t, value),
+    /// exactly, since open splines hold straight lines.
+    pub fn in_space(&self) -> Curve {
+        let mut out = self.opened();
+        if self.dim == 1 {
+            out.dim = 2;
+            let sites = span::greville(&out.axis);
+            for (p, u) in out.points.iter_mut().zip(sites) {
+                *p = [out.axis.from_knots(u), p[0], 0.0];
+            }
+        }
+        out
+    }
+
     fn along(&self, axis: Axis, rows: &[Taps]) -> Curve {
         Curve { axis, dim: self.dim, points: rows.iter().map(|r| span::combine(r, &self.points)).collect() }
     }

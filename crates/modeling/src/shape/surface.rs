@@ -109,6 +109,21 @@ impl Surface {
         self.along(axes, &rows)
     }
 
+    /// The surface in space that [`ParametricSurface`] sees, in the open basis: for one coordinate the graph
+    /// (s, t, height), exactly.
+    pub fn in_space(&self) -> Surface {
+        let mut out = self.opened();
+        if self.dim == 1 {
+            out.dim = 3;
+            let sites = out.axes.map(|a| span::greville(&a).into_iter().map(|u| a.from_knots(u)).collect::<Vec<_>>());
+            let width = sites[1].len();
+            for (k, p) in out.points.iter_mut().enumerate() {
+                *p = [sites[0][k / width], sites[1][k % width], p[0]];
+            }
+        }
+        out
+    }
+
     fn along(&self, axes: [Axis; 2], rows: &[Vec<Taps>; 2]) -> Surface {
         Surface { axes, dim: self.dim, points: combine_grid(&self.points, self.axes[1].len(), rows) }
     }
