@@ -217,7 +217,7 @@ fn bent(orientation: Orientation) -> (Curve, Curve, Vec<[f64; 3]>) {
     let axis = Axis::new(Open, 128, [0.0, 1.0]).unwrap();
     let greville =
         |j: usize| [j as f64 - 2.0, j as f64 - 1.0, j as f64].map(|k| k.clamp(0.0, 128.0)).iter().sum::<f64>() / 384.0;
-    let ripple = |j: usize| if j % 2 == 0 { 0.004 } else { -0.004 };
+    let ripple = |j: usize| if j.is_multiple_of(2) { 0.004 } else { -0.004 };
     let points = (0..131).map(|j| [greville(j), ripple(j), 0.0]).collect();
     let curve = Curve::new(axis, 2, points).unwrap();
     let mut editor = Editor::new(CurveLadder::new(&curve).unwrap());
