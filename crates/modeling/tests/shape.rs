@@ -268,7 +268,10 @@ fn polylines_and_meshes_stay_within_their_tolerance() {
 
 proptest! {
     // A search from samples can miss (about 1 surface of 5000 as rough as these): the same cases in every run.
-    #![proptest_config(ProptestConfig { rng_seed: proptest::test_runner::RngSeed::Fixed(5), ..ProptestConfig::with_cases(64) })]
+    #![proptest_config(ProptestConfig {
+        rng_seed: proptest::test_runner::RngSeed::Fixed(5),
+        ..ProptestConfig::with_cases(64)
+    })]
     #[test]
     fn no_sample_is_nearer_than_the_nearest_point(
         seed in 0u64..1000, b in 0usize..3, spans in 4usize..9, x in -2.0f64..2.0, y in -2.0f64..2.0, z in -1.0f64..1.0,
