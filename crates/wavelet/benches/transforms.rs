@@ -108,11 +108,12 @@ fn copy_bandwidth(threads: usize) -> f64 {
 
 fn main() {
     let csv = std::env::args().any(|a| a == "--csv");
+    let wanted: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
     let runs = 7;
     if !csv {
         println!("{:<24}{:>6}{:>14}{:>14}", "case", "type", "up Ms/s", "down Ms/s");
     }
-    for case in CASES {
+    for case in CASES.iter().filter(|c| wanted.is_empty() || wanted.iter().any(|w| c.name.contains(w.as_str()))) {
         let n = case.shape.iter().product::<usize>() as f64 / 1e6;
         for (kind, (up, down)) in [("f64", time::<f64>(case, runs)), ("f32", time::<f32>(case, runs))] {
             if csv {
@@ -122,7 +123,7 @@ fn main() {
             }
         }
     }
-    if !csv {
+    if !csv && wanted.is_empty() {
         let (one, two) = (wall(1), wall(2));
         let n = 4096.0 * 4096.0;
         println!(

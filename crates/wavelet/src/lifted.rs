@@ -4,7 +4,7 @@
 //! margin, continued beyond the ends of the array by the [`Extension`], and the steps run in place on the two arrays.
 
 use crate::coefficient::Scalar;
-use crate::cubic::{self, Buffers, Cubic};
+use crate::cubic::{Cubic, Row};
 use crate::extension::{Ends, Extension};
 use crate::lifting::{Needs, Scheme, run_step};
 use crate::rung::Kind;
@@ -66,7 +66,6 @@ impl Lifted {
 pub(crate) struct Scratch<S> {
     even: Vec<S>,
     odd: Vec<S>,
-    buffers: Buffers<S>,
 }
 
 /// Multiplies the ends that lie on a mirror.
@@ -112,9 +111,9 @@ impl<S: Scalar> Program<S> {
     pub(crate) fn up(&self, fine: &[S], smooth: &mut [S], detail: &mut [S], scratch: &mut Scratch<S>) {
         debug_assert_eq!(fine.len(), self.n);
         let (ns, nd) = (smooth.len(), detail.len());
-        if let Some(cubic) = &self.cubic {
-            cubic.up(fine, 0, (smooth, detail), &mut scratch.buffers, |p| self.extension.fine(self.n, p));
-            return;
+        if let Some(bank) = &self.cubic {
+            let index = |p| self.extension.fine(self.n, p);
+            return Row::<S, true>::up(bank).analyze(fine, 0, (smooth, detail), &mut scratch.even, index);
         }
         let lo = self.origin();
         let (gain_s, gain_d) = self.scheme.scale;
@@ -143,13 +142,9 @@ impl<S: Scalar> Program<S> {
     pub(crate) fn down(&self, smooth: &[S], detail: &[S], fine: &mut [S], scratch: &mut Scratch<S>) {
         debug_assert_eq!(fine.len(), self.n);
         let ns = smooth.len();
-        if let Some(steps) = &self.cubic {
-            let block = cubic::block::<S>();
-            for (b, out) in fine.chunks_mut(2 * block).enumerate() {
-                let index = (|k| self.extension.smooth(self.n, k), |k| self.extension.detail(self.n, k).0);
-                steps.down(smooth, detail, b * block, out, &mut scratch.buffers, index);
-            }
-            return;
+        if let Some(bank) = &self.cubic {
+            let index = (|k| self.extension.smooth(self.n, k), |k| self.extension.detail(self.n, k).0);
+            return Row::<S, true>::down(bank).synthesize_row(smooth, detail, fine, index);
         }
         let lo = self.origin();
         for k0 in (0..ns).step_by(BLOCK) {

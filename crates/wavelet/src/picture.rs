@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use crate::axis::{BAND, gain_down, gains_up, half_at, put, run, weigh_in};
 use crate::coefficient::Scalar;
-use crate::cubic::{Buffers, Columns, Group};
+use crate::cubic::{Columns, Cubic, Group, Row};
 use crate::lifted::{Program, Scratch};
 use crate::sweep::Sweep;
 
@@ -140,19 +140,22 @@ fn tiles_up<S: Scalar>(
     [top, bottom]: [&mut [S]; 2],
     stride: usize,
 ) {
-    let (Some(down_columns), Some(along_row)) = (col.cubic, row.cubic) else { return };
+    let (Some(down_columns), Some(bank)) = (col.cubic, row.cubic) else { return };
+    // Columns multiply by the gains of both axes.
+    let along_row = Row::<S, false>::up(&bank);
+    let [smooth_columns, detail_columns] = bank.gains().map(|g| down_columns.amplified(g));
     let (r, c) = (col.n, row.n);
     let (cs, cd, rd) = (c.div_ceil(2), c / 2, r / 2);
     let details = band.start..band.end.min(rd);
     let p = tile::<S>().min(cs);
-    let mut buffers = Buffers::default();
-    let mut columns = Columns::new(down_columns, 2 * cs);
+    let mut scratch = Vec::new();
+    let mut columns = Columns::new(2 * cs);
     let mut raw: [Vec<S>; 8] = std::array::from_fn(|_| vec![S::default(); 2 * p]);
     let mut nowhere: [[Vec<S>; 4]; 4] = std::array::from_fn(|_| std::array::from_fn(|_| vec![S::default(); p]));
     let mut load = |y: isize, p0: usize, (ws, wd): (usize, usize), to: &mut [S]| {
         let x = &src[col.extension.fine(r, y) * c..][..c];
         let (s, d) = to[..ws + wd].split_at_mut(ws);
-        along_row.up(x, p0, (s, d), &mut buffers, |q| row.extension.fine(c, q));
+        along_row.analyze(x, p0, (s, d), &mut scratch, |q| row.extension.fine(c, q));
     };
     let start = band.start as isize - 2;
     for k in (start..band.end as isize + 2).step_by(4) {
@@ -175,14 +178,14 @@ fn tiles_up<S: Scalar>(
                 first: four_rows(coarse, cs, p0..p0 + ws, k - 2, &band, n0),
                 second: four_rows(bottom, stride, p0..p0 + ws, k - 1, &details, n1),
             };
-            columns.up(from, even, odd, out);
+            columns.up(&smooth_columns, from, even, odd, out);
             let (even, odd) = pairs(ws, wd);
             let place = cs + p0.min(cd)..cs + p0.min(cd) + wd;
             let out = Group {
                 first: four_rows(top, stride, place.clone(), k - 2, &band, n2),
                 second: four_rows(bottom, stride, place, k - 1, &details, n3),
             };
-            columns.up(from + ws, even, odd, out);
+            columns.up(&detail_columns, from + ws, even, odd, out);
         }
     }
 }
@@ -209,7 +212,9 @@ fn tiles_down<S: Scalar>(
     k0: usize,
     rows: &mut [S],
 ) {
-    let (Some(down_columns), Some(along_row)) = (col.cubic, row.cubic) else { return };
+    let (Some(down_columns), Some(bank)) = (col.cubic, row.cubic) else { return };
+    let along_row = Row::<S, false>::down(&bank);
+    let [smooth_columns, detail_columns] = bank.gains().map(|g| down_columns.amplified(g));
     let (r, c) = (col.n, row.n);
     let (rs, cs) = (r.div_ceil(2), c.div_ceil(2));
     let k1 = k0 + (rows.len() / c).div_ceil(2);
@@ -225,8 +230,7 @@ fn tiles_down<S: Scalar>(
             (p0, p1, smooth, detail)
         })
         .collect();
-    let mut columns = Columns::new(down_columns, tiles.len() * width);
-    let mut buffers = Buffers::default();
+    let mut columns = Columns::new(tiles.len() * width);
     let mut even: [Vec<S>; 4] = std::array::from_fn(|_| vec![S::default(); width]);
     let mut odd = even.clone();
     for k in (k0 as isize - 1..k1 as isize + 1).step_by(4) {
@@ -235,20 +239,20 @@ fn tiles_down<S: Scalar>(
             std::array::from_fn(|i| (rs + col.extension.detail(r, k - 2 + i as isize).0) * stride);
         for (t, (p0, p1, smooth_runs, detail_runs)) in tiles.iter().enumerate() {
             let ws = p1 - p0 + 2;
-            let mut run = |place: usize, n: usize, smooth: [&[S]; 4], detail: [&[S]; 7]| {
+            let mut run = |bank: &Cubic<S>, place: usize, n: usize, smooth: [&[S]; 4], detail: [&[S]; 7]| {
                 let out = Group {
                     first: even.each_mut().map(|r| &mut r[place..place + n]),
                     second: odd.each_mut().map(|r| &mut r[place..place + n]),
                 };
-                columns.down(t * width + place, smooth, detail, out);
+                columns.down(bank, t * width + place, smooth, detail, out);
             };
             for &(place, at, n) in smooth_runs {
                 let smooth = smooth_rows.map(|y| &coarse[y * cs + at..][..n]);
-                run(place, n, smooth, detail_rows.map(|y| &details[y + at..][..n]));
+                run(&smooth_columns, place, n, smooth, detail_rows.map(|y| &details[y + at..][..n]));
             }
             for &(place, at, n) in detail_runs {
                 let smooth = smooth_rows.map(|y| &details[y * stride + cs + at..][..n]);
-                run(ws + place, n, smooth, detail_rows.map(|y| &details[y + cs + at..][..n]));
+                run(&detail_columns, ws + place, n, smooth, detail_rows.map(|y| &details[y + cs + at..][..n]));
             }
             for (i, (even, odd)) in even.iter().zip(&odd).enumerate() {
                 let pair = k - 1 + i as isize;
@@ -258,7 +262,7 @@ fn tiles_down<S: Scalar>(
                 for (y, from) in [(2 * pair as usize, even), (2 * pair as usize + 1, odd)] {
                     if y < r {
                         let to = &mut rows[(y - 2 * k0) * c..][2 * p0..(2 * p1).min(c)];
-                        along_row.row_down_from(&from[..ws], &from[ws..], to, &mut buffers);
+                        along_row.synthesize(&from[..ws], &from[ws..], to);
                     }
                 }
             }
