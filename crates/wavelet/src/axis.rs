@@ -7,7 +7,7 @@ use crate::coefficient::Scalar;
 use crate::extension::Ends;
 use crate::lifted::{Program, Scratch};
 use crate::rung::{Engine, Kind, Rung};
-use crate::sweep::Sweep;
+use crate::sweep::{Rings, Sweep};
 use ondelette_numerics::par;
 
 /// Pairs of rows per task.
@@ -81,7 +81,7 @@ pub(crate) fn up<S: Scalar>(rung: &Rung, kind: Kind, src: &[S], dst: &mut [S], i
                     weigh_in(&program, program.extension.fine_ends(), p, n, row);
                 };
                 let (k0, smooth, detail) = (h.k0, h.smooth, h.detail);
-                sweep.run(k0, h.k1, inner, fetch, |k, e, o| {
+                sweep.run(k0, h.k1, inner, &mut Rings::default(), fetch, |k, e, o| {
                     let (gs, gd) = gains_up(&program, k, ns, nd);
                     put(&mut smooth[(k - k0) * inner..][..inner], e, gs);
                     if k < nd {
@@ -138,7 +138,7 @@ pub(crate) fn down<S: Scalar>(rung: &Rung, kind: Kind, src: &[S], dst: &mut [S],
                     if nd == 0 && odd { row.fill(S::default()) } else { put(row, &from[i * inner..][..inner], by) }
                 };
                 let k1 = k0 + (rows.len() / inner).div_ceil(2);
-                sweep.run(k0, k1, inner, fetch, |k, e, o| {
+                sweep.run(k0, k1, inner, &mut Rings::default(), fetch, |k, e, o| {
                     for (p, row) in [(2 * k, e), (2 * k + 1, o)] {
                         if p < n {
                             put(&mut rows[(p - 2 * k0) * inner..][..inner], row, gain_down(&program, p));

@@ -48,6 +48,7 @@ mod rung;
 mod sampling;
 mod scaling;
 mod space;
+mod spare;
 mod sparse;
 mod sweep;
 mod tables;

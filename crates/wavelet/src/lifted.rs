@@ -62,7 +62,7 @@ impl Lifted {
 }
 
 /// Reused arrays of a program.
-#[derive(Default)]
+#[derive(Debug, Default)]
 pub(crate) struct Scratch<S> {
     even: Vec<S>,
     odd: Vec<S>,

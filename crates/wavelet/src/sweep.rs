@@ -83,13 +83,15 @@ impl<'a, S: Scalar> Sweep<'a, S> {
         k0: usize,
         k1: usize,
         width: usize,
+        rings: &mut Rings<S>,
         mut fetch: impl FnMut(bool, isize, &mut [S]),
         mut emit: impl FnMut(usize, &[S], &[S]),
     ) {
         let needs = &self.program.needs;
         let (a, b) = (k0 as isize, k1 as isize);
-        let mut even = Ring::new(self.depth[0], width);
-        let mut odd = Ring::new(self.depth[1], width);
+        let [even, odd] = &mut rings.0;
+        let mut even = Ring::new(even, self.depth[0], width);
+        let mut odd = Ring::new(odd, self.depth[1], width);
         for t in a + needs.even.lo.min(needs.odd.lo)..b + self.emit_lag {
             if (a + needs.even.lo..b + needs.even.hi).contains(&t) {
                 fetch(false, t, even.row_mut(t));
@@ -115,7 +117,13 @@ impl<'a, S: Scalar> Sweep<'a, S> {
     }
 }
 
-fn run_rows<S: Scalar>(step: &Step<S>, even: &mut Ring<S>, odd: &mut Ring<S>, k: isize, x: std::ops::Range<usize>) {
+fn run_rows<'a, S: Scalar>(
+    step: &Step<S>,
+    even: &mut Ring<'a, S>,
+    odd: &mut Ring<'a, S>,
+    k: isize,
+    x: std::ops::Range<usize>,
+) {
     match step {
         Step::Lift { odd: target_odd, first, taps } => {
             let (target, other) = if *target_odd { (odd, &*even) } else { (even, &*odd) };
@@ -141,18 +149,24 @@ fn run_rows<S: Scalar>(step: &Step<S>, even: &mut Ring<S>, odd: &mut Ring<S>, k:
     }
 }
 
+/// Memory of the rings of even and odd rows.
+#[derive(Debug, Default)]
+pub(crate) struct Rings<S>([Vec<S>; 2]);
+
 /// The last `depth` rows; rows are padded off power-of-two strides.
-struct Ring<S> {
+struct Ring<'a, S> {
     depth: isize,
     stride: usize,
     width: usize,
-    data: Vec<S>,
+    data: &'a mut [S],
 }
 
-impl<S: Scalar> Ring<S> {
-    fn new(depth: usize, width: usize) -> Ring<S> {
+impl<'a, S: Scalar> Ring<'a, S> {
+    fn new(memory: &'a mut Vec<S>, depth: usize, width: usize) -> Ring<'a, S> {
         let stride = width + 16;
-        Ring { depth: depth as isize, stride, width, data: vec![S::default(); depth * stride] }
+        memory.clear();
+        memory.resize(depth * stride, S::default());
+        Ring { depth: depth as isize, stride, width, data: memory }
     }
 
     fn at(&self, k: isize) -> usize {

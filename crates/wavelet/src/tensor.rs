@@ -3,11 +3,12 @@
 use std::ops::Range;
 
 use crate::axis;
-use crate::coefficient::{Coefficient, Scalar};
+use crate::coefficient::{Coefficient, Scalar, first_not_finite};
 use crate::decomposition::{Decomposition, blocks_of};
-use crate::picture;
+use crate::picture::{self, Band};
 use crate::pyramid::{Pyramid, TransformError, check};
 use crate::rung::{Engine, Kind, put_channel, take_channel};
+use crate::spare::Spare;
 
 /// How one-dimensional wavelets make functions of several variables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -151,7 +152,7 @@ impl Tensor {
         self.check_len(C::flat(out), n)?;
         // In overlapping bases every sample reaches the coarsest smooth coefficients, and a value that is not finite
         // leaves none of them finite on its way: looking there saves a pass over the input.
-        let lazy = self.axes.iter().all(|a| a.levels() > 0 && matches!(a.rung(0).engine, Engine::Lifted(_)));
+        let lazy = self.overlaps();
         if !lazy {
             check(C::flat(grid), n)?;
         }
@@ -196,8 +197,14 @@ impl Tensor {
         work: &mut Workspace<C::Scalar>,
     ) -> Result<(), TransformError> {
         let n = self.len() * C::CHANNELS;
-        check(C::flat(wavelets), n)?;
+        self.check_len(C::flat(wavelets), n)?;
         self.check_len(C::flat(out), n)?;
+        // A coefficient that is not finite leaves none of the samples finite that its function reaches, and those are
+        // two neighbours at least: every other row of the result tells.
+        let lazy = self.overlaps() && self.axes.len() > 1;
+        if !lazy {
+            check(C::flat(wavelets), n)?;
+        }
         let plain = self.axes.iter().all(|a| (0..=a.levels()).all(|i| a.heights().smooth(i) == 1.0));
         let plain = plain && self.axes.iter().all(|a| (0..a.levels()).all(|i| a.heights().detail(i) == 1.0));
         self.by_channel(wavelets, out, |from, to| {
@@ -214,7 +221,20 @@ impl Tensor {
                 Layout::NonStandard => self.nonstandard_down(kind, from, to, work),
             }
         });
+        if lazy {
+            let width = self.axes[self.axes.len() - 1].len();
+            let mut rows = C::flat(out).chunks(width * C::CHANNELS).step_by(2);
+            if rows.any(|row| first_not_finite(row).is_some()) {
+                // Finite coefficients that overflowed are no error.
+                check(C::flat(wavelets), n)?;
+            }
+        }
         Ok(())
+    }
+
+    /// Whether values that are not finite show in the result, so that the input needs no pass of its own.
+    fn overlaps(&self) -> bool {
+        self.axes.iter().all(|a| a.levels() > 0 && matches!(a.rung(0).engine, Engine::Lifted(_)))
     }
 
     fn check_len<S>(&self, x: &[S], want: usize) -> Result<(), TransformError> {
@@ -290,14 +310,14 @@ impl Tensor {
         }
         for level in (0..levels).rev() {
             let coarse_shape = self.level_shape(level);
-            let (now, coarse) = work.pair(levels - level, coarse_shape.iter().product());
+            let (now, coarse) = work.turns.pair(levels - level, coarse_shape.iter().product());
             let now = if level + 1 == levels { from } else { now };
             let engines = self.axes.iter().map(|a| &a.rung(level).engine).collect::<Vec<_>>();
             if let [axis] = &self.axes[..] {
                 let rung = axis.rung(level);
                 rung.up_flat(kind, &now[..rung.fine()], coarse, &mut to[rung.smooth()..rung.fine()]);
             } else if let [Engine::Lifted(a), Engine::Lifted(b)] = engines[..] {
-                picture::up_picture([&a.up(kind), &b.up(kind)], now, coarse, to, shape[1]);
+                picture::up_picture([&a.up(kind), &b.up(kind)], now, coarse, to, shape[1], &work.bands);
             } else {
                 let fine_shape = self.level_shape(level + 1);
                 let len: usize = fine_shape.iter().product();
@@ -318,14 +338,15 @@ impl Tensor {
             return to.copy_from_slice(from);
         }
         let coarse_shape = self.level_shape(0);
-        let (_, coarse) = work.pair(levels, coarse_shape.iter().product());
+        let (_, coarse) = work.turns.pair(levels, coarse_shape.iter().product());
         copy_box(from, &shape, coarse, &coarse_shape, &coarse_shape);
         for level in 0..levels {
             let fine_shape = self.level_shape(level + 1);
             let coarse_shape = self.level_shape(level);
             let last = level + 1 == levels;
             // The pair of the level above: what it calls its output is read here.
-            let (coarse, fine) = work.pair(levels - level - 1, if last { 0 } else { fine_shape.iter().product() });
+            let (coarse, fine) =
+                work.turns.pair(levels - level - 1, if last { 0 } else { fine_shape.iter().product() });
             let fine = if last { &mut *to } else { fine };
             let coarse = &coarse[..coarse_shape.iter().product()];
             let engines = self.axes.iter().map(|a| &a.rung(level).engine).collect::<Vec<_>>();
@@ -333,7 +354,7 @@ impl Tensor {
                 let rung = axis.rung(level);
                 rung.down_flat(kind, coarse, &from[rung.smooth()..rung.fine()], fine);
             } else if let [Engine::Lifted(a), Engine::Lifted(b)] = engines[..] {
-                picture::down_picture([&a.down(kind), &b.down(kind)], coarse, from, shape[1], fine);
+                picture::down_picture([&a.down(kind), &b.down(kind)], coarse, from, shape[1], fine, &work.bands);
             } else {
                 copy_box(from, &shape, fine, &fine_shape, &fine_shape);
                 copy_box(coarse, &coarse_shape, fine, &fine_shape, &coarse_shape);
@@ -386,13 +407,17 @@ impl Tensor {
 #[derive(Clone, Debug, Default)]
 pub struct Workspace<S> {
     /// The smooth coefficients of every other level.
-    turns: [Vec<S>; 2],
+    turns: Turns<S>,
+    bands: Spare<Band<S>>,
 }
 
-impl<S: Scalar> Workspace<S> {
+#[derive(Clone, Debug, Default)]
+struct Turns<S>([Vec<S>; 2]);
+
+impl<S: Scalar> Turns<S> {
     /// The array of the level before `turn`, and that of `turn` with `len` values.
     fn pair(&mut self, turn: usize, len: usize) -> (&[S], &mut [S]) {
-        let [a, b] = &mut self.turns;
+        let [a, b] = &mut self.0;
         let (before, now) = if turn % 2 == 1 { (a, b) } else { (b, a) };
         if now.len() < len {
             now.resize(len, S::default());

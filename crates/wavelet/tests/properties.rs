@@ -115,6 +115,11 @@ proptest! {
                     prop_assert!(false, "{family} {boundary} {rows}x{cols} {kind:?}: {norms:?}");
                 }
             }
+            let mut back = x.clone();
+            match tensor.down_into(kind, &x, &mut back) {
+                Err(TransformError::NotFinite { index, .. }) => prop_assert_eq!(index, at),
+                other => prop_assert!(false, "{family} {boundary} {rows}x{cols} {kind:?} down: {other:?}"),
+            }
         }
     }
 

@@ -14,6 +14,7 @@ macro_rules! cut {
 }
 
 /// What the column loops keep from one group of four pairs of rows to the next, for all columns of a picture.
+#[derive(Debug, Default)]
 pub(crate) struct Columns<S> {
     state: [Vec<S>; 6],
 }
@@ -25,8 +26,9 @@ pub(crate) struct Group<'a, S> {
 }
 
 impl<S: Scalar> Columns<S> {
-    pub(crate) fn new(width: usize) -> Columns<S> {
-        Columns { state: std::array::from_fn(|_| vec![S::default(); width]) }
+    /// Makes room for `width` columns.
+    pub(crate) fn widen(&mut self, width: usize) {
+        super::band::widen(self.state.iter_mut(), width);
     }
 
     /// Before the first group: the odd row that precedes it, columns `from..`.

@@ -1,16 +1,18 @@
 //! The bank of the thesis (4, 4), three symmetric steps, fused: the hottest loops of the library.
 //!
 //! Analysis is `e += a (o + o)`, `o += b (e + e)`, `e += c (o + o) + d (o + o)`; synthesis runs the three backwards.
-//! [`Row`] streams along a row, [`Columns`] down a picture. Both give the numbers of the general path up to
+//! [`Row`] streams along a row, `Columns` down a picture, [`Band`] joins them. All give the numbers of the general path up to
 //! rounding.
 
+mod band;
 mod columns;
 mod rows;
 
 use crate::coefficient::Scalar;
 use crate::lifting::{Scheme, Step};
 
-pub(crate) use columns::{Columns, Group};
+pub(crate) use band::Band;
+use columns::{Columns, Group};
 pub(crate) use rows::Row;
 
 /// The taps of the three steps, with the gains of both halves.
