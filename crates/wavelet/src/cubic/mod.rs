@@ -1,8 +1,8 @@
 //! The bank of the thesis (4, 4), three symmetric steps, fused: the hottest loops of the library.
 //!
 //! Analysis is `e += a (o + o)`, `o += b (e + e)`, `e += c (o + o) + d (o + o)`; synthesis runs the three backwards.
-//! [`Row`] streams along a row, `Columns` down a picture, [`Band`] joins them. All give the numbers of the general path up to
-//! rounding.
+//! [`Row`] streams along a row, `Columns` down a picture, [`Band`] joins them. All give the numbers of the general path
+//! up to rounding.
 
 mod band;
 mod columns;

@@ -22,8 +22,8 @@ struct Past<S> {
 
 /// A bank along a row. The gains are part of the taps; a bank without gains (`GAIN` false) is two products cheaper.
 ///
-/// Analysis: `l = e + a (o + o)`, `detail = g o + b (l + l)`, `smooth = h l + c (detail + detail) + d (...)`. Synthesis:
-/// `e = h smooth + c (detail + detail) + d (...)`, `o = g detail + b (e + e)`, `e + a (o + o)`.
+/// Analysis: `l = e + a (o + o)`, `detail = g o + b (l + l)`, `smooth = h l + c (detail + detail) + d (...)`.
+/// Synthesis: `e = h smooth + c (detail + detail) + d (...)`, `o = g detail + b (e + e)`, then `e + a (o + o)`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Row<S, const GAIN: bool> {
     a: S,
