@@ -7,7 +7,7 @@ use ondelette_wavelet::{
 };
 use serde_json::Value;
 
-use crate::report::{Report, field, whole};
+use crate::report::{Report, count, field, whole};
 
 /// The pyramid of a family name of the vectors on `2^levels` spans or cells.
 pub(crate) fn by_name(name: &str, levels: usize) -> Result<Pyramid, String> {
@@ -236,7 +236,7 @@ pub(crate) fn semi(section: &Value, report: &mut Report) {
         report.fail("semi", e);
     }
     report.each("semi.gram", &section["gram"], |name, entry, report| {
-        let (n, a) = (whole(entry, "n")?, whole(entry, "a")?);
+        let (n, a) = (count(entry, "n", 1024)?, count(entry, "a", 3)?);
         if n == 0 {
             return Err("n is 0".to_owned());
         }

@@ -120,8 +120,13 @@ pub(crate) fn field(entry: &Value, name: &str) -> Result<Vec<f64>, String> {
     numbers(&entry[name]).filter(|_| !entry[name].is_null()).ok_or_else(|| format!("no field {name}"))
 }
 
-/// A whole number that must be there.
-pub(crate) fn whole(entry: &Value, name: &str) -> Result<usize, String> {
+/// A whole number up to `most` that must be there.
+pub(crate) fn count(entry: &Value, name: &str, most: usize) -> Result<usize, String> {
     let n = entry[name].as_u64().ok_or_else(|| format!("no whole number {name}"))?;
-    usize::try_from(n).ok().filter(|n| *n <= 24).ok_or_else(|| format!("{name} = {n} is above 24"))
+    usize::try_from(n).ok().filter(|n| *n <= most).ok_or_else(|| format!("{name} = {n} is above {most}"))
+}
+
+/// A level, an order or a number of derivatives: a small whole number that must be there.
+pub(crate) fn whole(entry: &Value, name: &str) -> Result<usize, String> {
+    count(entry, name, 24)
 }

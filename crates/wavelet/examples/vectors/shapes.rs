@@ -294,7 +294,7 @@ pub(crate) fn scaling(section: &Value, report: &mut Report) {
         let scaling: Scaling = sigma(entry)?;
         for (at, want) in entry["values"].as_array().into_iter().flatten().enumerate() {
             let level = whole(want, "L")?;
-            if level > 8 {
+            if level > 9 {
                 return Err(format!("L = {level} is too large for a dense eigenvalue problem"));
             }
             let p = by_name("bspline", level)?.with_scaling(scaling);
