@@ -220,7 +220,10 @@ pub(crate) fn semi(section: &Value, report: &mut Report) {
         report.check("semi.g_times_8fact", &g, &section["g_times_8fact"], TOL);
         for (level, want) in section["coarse_windows"].as_object().into_iter().flatten() {
             let fine: u32 = level.parse().map_err(|_| "coarse_windows level is not a number")?;
-            let (smooth, c) = columns(1 << fine.min(16))?;
+            if fine > 9 {
+                return Err(format!("coarse_windows of level {fine}: at most 9"));
+            }
+            let (smooth, c) = columns(1 << fine)?;
             // Stored as integers; both sides are scaled to a largest coefficient of 1.
             let largest = |x: &[f64]| x.iter().fold(0.0_f64, |m, v| if v.abs() > m.abs() { *v } else { m });
             let rows: Option<Vec<Vec<f64>>> =
