@@ -129,10 +129,15 @@ fn blossom(coarse: &OpenKnots, k: usize, u: &[i64], at: i64) -> BigRational {
 }
 
 /// A wavelet: first fine index and coefficients.
-type Column = (usize, Vec<BigRational>);
+type Column = (usize, Vec<f64>);
 
-fn interior_wavelet() -> Vec<BigRational> {
-    [-1, 124, -1677, 7904, -18482, 24264, -18482, 7904, -1677, 124, -1].map(|c| ratio(c, 40320)).to_vec()
+fn rounded(exact: &[BigRational]) -> Vec<f64> {
+    exact.iter().map(to_f64).collect()
+}
+
+/// Away from the ends of uniform knots. The numerators are exact, so this is the nearest f64 of each entry.
+fn interior_wavelet() -> Vec<f64> {
+    [-1, 124, -1677, 7904, -18482, 24264, -18482, 7904, -1677, 124, -1].map(|c| f64::from(c) / 40320.0).to_vec()
 }
 
 /// The boundary columns g_-3, g_-2, g_-1 of A.2, with the corrected g_-1.
@@ -158,9 +163,10 @@ fn wavelets(fine: &OpenKnots) -> Vec<Column> {
     let coarse = fine.coarser();
     let uniform = fine.uniform_spans();
     if uniform == n && n.is_multiple_of(2) && n >= 16 {
-        let mut out: Vec<Column> = boundary_wavelets().map(|g| (0, g)).to_vec();
+        let boundary = boundary_wavelets().map(|g| rounded(&g));
+        let mut out: Vec<Column> = boundary.clone().map(|g| (0, g)).to_vec();
         out.extend((0..n / 2 - 6).map(|j| (2 * j + 3, interior_wavelet())));
-        let right = boundary_wavelets().map(|mut g| {
+        let right = boundary.map(|mut g| {
             g.reverse();
             (n + 3 - g.len(), g)
         });
@@ -199,7 +205,7 @@ fn wavelets(fine: &OpenKnots) -> Vec<Column> {
                 functions.iter().map(|f| f.inner(&coarse)).collect()
             })
             .collect();
-        out.push((s, null_vector(rows, c)));
+        out.push((s, rounded(&null_vector(rows, c))));
     }
     out
 }
@@ -262,11 +268,10 @@ impl Solved {
                 all.push((2 * k - 3, inner.clone()));
             } else {
                 let (first, c) = fine.insertion(&coarse, k);
-                all.push((first, c.iter().map(to_f64).collect()));
+                all.push((first, rounded(&c)));
             }
         }
-        for (first, c) in wavelets(fine) {
-            let mut c: Vec<f64> = c.iter().map(to_f64).collect();
+        for (first, mut c) in wavelets(fine) {
             if columns == OpenColumns::Unit {
                 let norm = c.iter().map(|x| x * x).sum::<f64>().sqrt();
                 c.iter_mut().for_each(|x| *x /= norm);

@@ -105,6 +105,9 @@ pub(crate) fn check<S: Scalar>(x: &[S], want: usize) -> Result<(), TransformErro
     }
 }
 
+/// Longest axis: no memory holds more, and all sums of indices stay far from overflow.
+const MAX_LEN: usize = 1 << 40;
+
 /// Levels that `len` coefficients allow.
 ///
 /// Mirrored: until two coefficients are left (even filters: one). Periodic and tree families: while the length divides
@@ -119,6 +122,9 @@ pub fn levels_allowed(family: Family, boundary: Boundary, len: usize) -> Result<
     let cell = family.cell();
     if len == 0 {
         return length("an axis needs coefficients".to_owned());
+    }
+    if len > MAX_LEN {
+        return length(format!("at most {MAX_LEN}"));
     }
     if !len.is_multiple_of(cell) {
         return length(format!("{} and {} would fit", len / cell * cell, len.next_multiple_of(cell)));

@@ -45,6 +45,9 @@ pub enum TensorError {
     /// Not 1 to 4 axes.
     #[error("{0} axes; a tensor transform has 1 to 4")]
     Axes(usize),
+    /// More values than memory can hold.
+    #[error("a grid of {0:?} has more values than memory can hold")]
+    Size(Vec<usize>),
     /// Axes of a non-standard transform with different levels.
     #[error("non-standard axes must have equally many levels, got {0:?}; ask for the least of them")]
     Levels(Vec<usize>),
@@ -54,10 +57,16 @@ impl Tensor {
     /// The transform with the given pyramid on each axis.
     ///
     /// # Errors
-    /// Not 1 to 4 axes; axes of a non-standard transform with different numbers of levels.
+    /// Not 1 to 4 axes; axes of a non-standard transform with different numbers of levels; more values than memory can
+    /// hold.
     pub fn new(axes: Vec<Pyramid>, layout: Layout) -> Result<Tensor, TensorError> {
         if !(1..=4).contains(&axes.len()) {
             return Err(TensorError::Axes(axes.len()));
+        }
+        let shape: Vec<_> = axes.iter().map(Pyramid::len).collect();
+        let values = shape.iter().try_fold(1_usize, |n, &len| n.checked_mul(len));
+        if values.is_none_or(|n| n > isize::MAX as usize / 64) {
+            return Err(TensorError::Size(shape));
         }
         let levels: Vec<_> = axes.iter().map(Pyramid::levels).collect();
         if layout == Layout::NonStandard && levels.windows(2).any(|w| w[0] != w[1]) {

@@ -149,6 +149,39 @@ fn empty_and_short_input_is_refused() {
 }
 
 #[test]
+fn absurd_lengths_are_refused() {
+    for name in NAMES {
+        let family: Family = name.parse().expect("a family");
+        for boundary in [Boundary::Mirrored, Boundary::Open, Boundary::Periodic] {
+            for len in [usize::MAX, usize::MAX - 1, usize::MAX / 2 + 1, usize::MAX / 2 + 2, 1 << 62, (1 << 40) + 8] {
+                assert!(levels_allowed(family, boundary, len).is_err(), "{name} {boundary} {len}");
+                assert!(Pyramid::deepest(family, boundary, len).is_err(), "{name} {boundary} {len}");
+            }
+        }
+    }
+    let axis = Pyramid::new("haar".parse().expect("a family"), Boundary::Periodic, 1 << 40, 2).expect("allowed");
+    assert!(Tensor::new(vec![axis.clone(), axis], Layout::NonStandard).is_err());
+}
+
+#[test]
+fn memory_of_an_earlier_call_changes_no_bit() {
+    let axis = |n| Pyramid::new("bspline".parse().expect("a family"), Boundary::Mirrored, n, 3).expect("allowed");
+    let tensor = Tensor::new(vec![axis(70), axis(83)], Layout::NonStandard).expect("equal levels");
+    let x: Vec<f64> = (0..70 * 83).map(|i| (f64::from(i) * 0.37).sin()).collect();
+    let (mut fresh, mut reused, mut work) = (x.clone(), x.clone(), ondelette_wavelet::Workspace::default());
+    let bad = vec![f64::NAN; x.len()];
+    assert!(tensor.up_with(Kind::Coefficients, &bad, &mut reused, &mut work).is_err());
+    assert!(tensor.down_with(Kind::Coefficients, &bad, &mut reused, &mut work).is_err());
+    tensor.up_into(Kind::Coefficients, &x, &mut fresh).expect("finite");
+    tensor.up_with(Kind::Coefficients, &x, &mut reused, &mut work).expect("finite");
+    assert!(fresh == reused);
+    let (mut back, mut again) = (x.clone(), x.clone());
+    tensor.down_into(Kind::Coefficients, &fresh, &mut back).expect("finite");
+    tensor.down_with(Kind::Coefficients, &fresh, &mut again, &mut work).expect("finite");
+    assert!(back == again);
+}
+
+#[test]
 fn polynomials_leave_no_detail_where_the_moments_vanish() {
     // Dual moments: the cubic spaces reproduce cubics inside; the open one up to its ends.
     let cubic = |t: f64| 2.0 - t + 0.3 * t * t - 0.01 * t * t * t;
