@@ -94,11 +94,7 @@ pub(crate) fn up<S: Scalar>(rung: &Rung, kind: Kind, src: &[S], dst: &mut [S], i
             let tasks = src.chunks(slab).zip(dst.chunks_mut(slab)).collect();
             run(src.len(), tasks, |(src, dst): (&[S], &mut [S])| {
                 let (s, d) = dst.split_at_mut(ns * inner);
-                match &rung.engine {
-                    Engine::Block(b) => b.up(kind, src, s, d, inner),
-                    Engine::Solved(b) => b.up(kind, src, s, d, inner),
-                    Engine::Lifted(_) => {}
-                }
+                rung.engine.up(kind, src, s, d, inner);
             });
         }
     }
@@ -151,11 +147,7 @@ pub(crate) fn down<S: Scalar>(rung: &Rung, kind: Kind, src: &[S], dst: &mut [S],
             let tasks = src.chunks(slab).zip(dst.chunks_mut(slab)).collect();
             run(src.len(), tasks, |(src, dst): (&[S], &mut [S])| {
                 let (s, d) = src.split_at(ns * inner);
-                match &rung.engine {
-                    Engine::Block(b) => b.down(kind, s, d, dst, inner),
-                    Engine::Solved(b) => b.down(kind, s, d, dst, inner),
-                    Engine::Lifted(_) => {}
-                }
+                rung.engine.down(kind, s, d, dst, inner);
             });
         }
     }

@@ -99,25 +99,7 @@ impl Rung {
     #[track_caller]
     pub fn up<C: Coefficient>(&self, kind: Kind, fine: &[C], smooth: &mut [C], detail: &mut [C]) {
         self.check(fine.len(), smooth.len(), detail.len());
-        let (f, s, d) = (C::flat(fine), C::flat_mut(smooth), C::flat_mut(detail));
-        match (&self.engine, C::CHANNELS) {
-            (Engine::Lifted(l), 1) => l.up(kind).up(f, s, d, &mut Scratch::default()),
-            (Engine::Lifted(l), m) => {
-                let program = l.up(kind);
-                let mut scratch = Scratch::default();
-                let mut plane = vec![C::Scalar::default(); fine.len()];
-                let (mut ps, mut pd) = (vec![C::Scalar::default(); smooth.len()], plane.clone());
-                let pd = &mut pd[..detail.len()];
-                for c in 0..m {
-                    take_channel(C::flat(fine), &mut plane, c, m);
-                    program.up(&plane, &mut ps, pd, &mut scratch);
-                    put_channel(&ps, C::flat_mut(smooth), c, m);
-                    put_channel(pd, C::flat_mut(detail), c, m);
-                }
-            }
-            (Engine::Block(b), m) => b.up(kind, f, s, d, m),
-            (Engine::Solved(solved), m) => solved.up(kind, f, s, d, m),
-        }
+        self.engine.up(kind, C::flat(fine), C::flat_mut(smooth), C::flat_mut(detail), C::CHANNELS);
     }
 
     /// Towards finer: smooth and detail to fine. Linear time.
@@ -127,43 +109,7 @@ impl Rung {
     #[track_caller]
     pub fn down<C: Coefficient>(&self, kind: Kind, smooth: &[C], detail: &[C], fine: &mut [C]) {
         self.check(fine.len(), smooth.len(), detail.len());
-        let (s, d, f) = (C::flat(smooth), C::flat(detail), C::flat_mut(fine));
-        match (&self.engine, C::CHANNELS) {
-            (Engine::Lifted(l), 1) => l.down(kind).down(s, d, f, &mut Scratch::default()),
-            (Engine::Lifted(l), m) => {
-                let program = l.down(kind);
-                let mut scratch = Scratch::default();
-                let mut plane = vec![C::Scalar::default(); l.n];
-                let (mut ps, mut pd) = (vec![C::Scalar::default(); smooth.len()], plane.clone());
-                let pd = &mut pd[..detail.len()];
-                for c in 0..m {
-                    take_channel(s, &mut ps, c, m);
-                    take_channel(d, pd, c, m);
-                    program.down(&ps, pd, &mut plane, &mut scratch);
-                    put_channel(&plane, f, c, m);
-                }
-            }
-            (Engine::Block(b), m) => b.down(kind, s, d, f, m),
-            (Engine::Solved(solved), m) => solved.down(kind, s, d, f, m),
-        }
-    }
-
-    /// [`Rung::up`] on plain numbers.
-    pub(crate) fn up_flat<S: Scalar>(&self, kind: Kind, fine: &[S], smooth: &mut [S], detail: &mut [S]) {
-        match &self.engine {
-            Engine::Lifted(l) => l.up(kind).up(fine, smooth, detail, &mut Scratch::default()),
-            Engine::Block(b) => b.up(kind, fine, smooth, detail, 1),
-            Engine::Solved(b) => b.up(kind, fine, smooth, detail, 1),
-        }
-    }
-
-    /// [`Rung::down`] on plain numbers.
-    pub(crate) fn down_flat<S: Scalar>(&self, kind: Kind, smooth: &[S], detail: &[S], fine: &mut [S]) {
-        match &self.engine {
-            Engine::Lifted(l) => l.down(kind).down(smooth, detail, fine, &mut Scratch::default()),
-            Engine::Block(b) => b.down(kind, smooth, detail, fine, 1),
-            Engine::Solved(b) => b.down(kind, smooth, detail, fine, 1),
-        }
+        self.engine.down(kind, C::flat(smooth), C::flat(detail), C::flat_mut(fine), C::CHANNELS);
     }
 
     /// The synthesis matrix: `fine = S [smooth; detail]`, the definition of the rung.
@@ -193,6 +139,50 @@ impl Rung {
             "rung of (fine, smooth, detail) {own:?} got {:?}",
             (fine, smooth, detail)
         );
+    }
+}
+
+impl Engine {
+    /// [`Rung::up`] on `channels` interleaved numbers.
+    pub(crate) fn up<S: Scalar>(&self, kind: Kind, fine: &[S], smooth: &mut [S], detail: &mut [S], channels: usize) {
+        match self {
+            Engine::Lifted(l) if channels == 1 => l.up(kind).up(fine, smooth, detail, &mut Scratch::default()),
+            Engine::Lifted(l) => {
+                let program = l.up(kind);
+                let mut scratch = Scratch::default();
+                let [mut plane, mut halves] = [(); 2].map(|()| vec![S::default(); l.n]);
+                let (s, d) = halves.split_at_mut(smooth.len() / channels);
+                for c in 0..channels {
+                    take_channel(fine, &mut plane, c, channels);
+                    program.up(&plane, s, d, &mut scratch);
+                    put_channel(s, smooth, c, channels);
+                    put_channel(d, detail, c, channels);
+                }
+            }
+            Engine::Block(b) => b.up(kind, fine, smooth, detail, channels),
+            Engine::Solved(b) => b.up(kind, fine, smooth, detail, channels),
+        }
+    }
+
+    /// [`Rung::down`] on `channels` interleaved numbers.
+    pub(crate) fn down<S: Scalar>(&self, kind: Kind, smooth: &[S], detail: &[S], fine: &mut [S], channels: usize) {
+        match self {
+            Engine::Lifted(l) if channels == 1 => l.down(kind).down(smooth, detail, fine, &mut Scratch::default()),
+            Engine::Lifted(l) => {
+                let program = l.down(kind);
+                let mut scratch = Scratch::default();
+                let [mut plane, mut halves] = [(); 2].map(|()| vec![S::default(); l.n]);
+                let (s, d) = halves.split_at_mut(smooth.len() / channels);
+                for c in 0..channels {
+                    take_channel(smooth, s, c, channels);
+                    take_channel(detail, d, c, channels);
+                    program.down(s, d, &mut plane, &mut scratch);
+                    put_channel(&plane, fine, c, channels);
+                }
+            }
+            Engine::Block(b) => b.down(kind, smooth, detail, fine, channels),
+            Engine::Solved(b) => b.down(kind, smooth, detail, fine, channels),
+        }
     }
 }
 
@@ -255,12 +245,13 @@ impl Lifted {
 }
 
 impl Block {
+    fn block<S: Scalar>(&self, primal: bool) -> Vec<S> {
+        if primal { &self.primal } else { &self.dual }.iter().map(|&x| S::from_f64(x)).collect()
+    }
+
     pub(crate) fn up<S: Scalar>(&self, kind: Kind, fine: &[S], smooth: &mut [S], detail: &mut [S], channels: usize) {
         let (m, width) = (self.order, 2 * self.order);
-        let matrix: Vec<S> = match kind {
-            Kind::Coefficients => self.dual.iter().map(|&x| S::from_f64(x)).collect(),
-            Kind::Basis => self.primal.iter().map(|&x| S::from_f64(x)).collect(),
-        };
+        let matrix: Vec<S> = self.block(kind == Kind::Basis);
         let cell = m * channels;
         let halves = smooth.chunks_exact_mut(cell).zip(detail.chunks_exact_mut(cell));
         for (fine, (s, d)) in fine.chunks_exact(2 * cell).zip(halves) {
@@ -275,10 +266,7 @@ impl Block {
 
     pub(crate) fn down<S: Scalar>(&self, kind: Kind, smooth: &[S], detail: &[S], fine: &mut [S], channels: usize) {
         let (m, width) = (self.order, 2 * self.order);
-        let matrix: Vec<S> = match kind {
-            Kind::Coefficients => self.primal.iter().map(|&x| S::from_f64(x)).collect(),
-            Kind::Basis => self.dual.iter().map(|&x| S::from_f64(x)).collect(),
-        };
+        let matrix: Vec<S> = self.block(kind == Kind::Coefficients);
         let cell = m * channels;
         let halves = smooth.chunks_exact(cell).zip(detail.chunks_exact(cell));
         for (fine, (s, d)) in fine.chunks_exact_mut(2 * cell).zip(halves) {

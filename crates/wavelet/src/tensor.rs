@@ -324,7 +324,7 @@ impl Tensor {
             let engines = self.axes.iter().map(|a| &a.rung(level).engine).collect::<Vec<_>>();
             if let [axis] = &self.axes[..] {
                 let rung = axis.rung(level);
-                rung.up_flat(kind, &now[..rung.fine()], coarse, &mut to[rung.smooth()..rung.fine()]);
+                rung.engine.up(kind, &now[..rung.fine()], coarse, &mut to[rung.smooth()..rung.fine()], 1);
             } else if let [Engine::Lifted(a), Engine::Lifted(b)] = engines[..] {
                 picture::up_picture([&a.up(kind), &b.up(kind)], now, coarse, to, shape[1], &work.bands);
             } else {
@@ -361,7 +361,7 @@ impl Tensor {
             let engines = self.axes.iter().map(|a| &a.rung(level).engine).collect::<Vec<_>>();
             if let [axis] = &self.axes[..] {
                 let rung = axis.rung(level);
-                rung.down_flat(kind, coarse, &from[rung.smooth()..rung.fine()], fine);
+                rung.engine.down(kind, coarse, &from[rung.smooth()..rung.fine()], fine, 1);
             } else if let [Engine::Lifted(a), Engine::Lifted(b)] = engines[..] {
                 picture::down_picture([&a.down(kind), &b.down(kind)], coarse, from, shape[1], fine, &work.bands);
             } else {
