@@ -21,21 +21,28 @@ struct Facet {
     /// Rows that turn a point of the plane into (s, t).
     to_s: DVec3,
     to_t: DVec3,
+    /// How far s, t and, on triangles, s + t may lie outside.
+    edge: [f64; 3],
     triangle: bool,
 }
 
-/// Edges count as part of a patch: neighbours leave no gap between them.
-const EDGE: f64 = 1e-9;
+/// Edges count as part of a patch, and so does a rim of this share of the scene's diagonal: neighbours leave no gap
+/// between them, even if single precision or the digits of a text file have moved their corners apart.
+const EDGE: f64 = 1e-7;
 
 impl Facet {
-    fn of(patch: &Patch) -> Self {
+    /// A patch with a rim of the given width.
+    fn of(patch: &Patch, rim: f64) -> Self {
         let normal = patch.u.cross(patch.v);
         let inverse = 1.0 / normal.length_squared();
+        let (to_s, to_t) = (patch.v.cross(normal) * inverse, normal.cross(patch.u) * inverse);
         Facet {
             normal: normal.normalize(),
             origin: patch.origin,
-            to_s: patch.v.cross(normal) * inverse,
-            to_t: normal.cross(patch.u) * inverse,
+            to_s,
+            to_t,
+            // a needle's rim is not wider than the needle
+            edge: [to_s, to_t, to_s + to_t].map(|d| (rim * d.length()).min(0.5)),
             triangle: patch.shape == Shape::Triangle,
         }
     }
@@ -49,8 +56,9 @@ impl Facet {
         let t = self.normal.dot(self.origin - a) / slope;
         let p = a + d * t - self.origin;
         let (u, v) = (self.to_s.dot(p), self.to_t.dot(p));
-        let inside =
-            u >= -EDGE && v >= -EDGE && if self.triangle { u + v <= 1.0 + EDGE } else { u.max(v) <= 1.0 + EDGE };
+        let [rim_u, rim_v, rim_sum] = self.edge;
+        let far = if self.triangle { u + v <= 1.0 + rim_sum } else { u <= 1.0 + rim_u && v <= 1.0 + rim_v };
+        let inside = u >= -rim_u && v >= -rim_v && far;
         inside.then_some(t)
     }
 }
@@ -121,7 +129,7 @@ impl Occluders {
         let mut spent = std::time::Duration::ZERO;
         let params = BvhBuildParams { pre_split: false, ..BvhBuildParams::very_slow_build() };
         Occluders {
-            facets: scene.patches.iter().map(Facet::of).collect(),
+            facets: scene.patches.iter().map(|patch| Facet::of(patch, EDGE * scale)).collect(),
             corners,
             wide: obvhs::cwbvh::builder::build_cwbvh(&boxes, params, &mut spent),
             binary: obvhs::bvh2::builder::build_bvh2(&boxes, params, &mut spent),

@@ -1,5 +1,6 @@
 //! From the polygons of a file to a valid [`Scene`].
 
+use super::cut;
 use super::merge::{self, Piece};
 use super::polygon;
 use super::{Camera, LengthUnit, Material, Object, Patch, Provenance, Quantity, Scene, Shape, Side};
@@ -171,7 +172,7 @@ impl SceneDraft {
     /// make one are merged; every other polygon becomes triangles. Faces without area and repeated faces (same
     /// corners, same facing; any facing once a two-sided face is there) are dropped, with one warning each that counts
     /// them and names the first.
-    /// A face that touches another, or lies on it, is legal.
+    /// A face that touches another, or lies on it, is legal; patches that others divide into rooms are cut there.
     ///
     /// **Cost** O(n log n) in the number of corners.
     ///
@@ -224,7 +225,13 @@ impl SceneDraft {
         if options.two_sided {
             self.materials.iter_mut().for_each(|m| m.two_sided = true);
         }
-        let patches = self.patches(&mut warnings);
+        let (patches, divided) = cut::cut(self.patches(&mut warnings));
+        if divided > 0 {
+            let (s, are) = if divided == 1 { ("", "is") } else { ("es", "are") };
+            warnings.push(format!(
+                "{divided} patch{s} {are} divided by walls that stand on or cross them: cut along these"
+            ));
+        }
         if patches.is_empty() {
             return Err(SceneError::Empty(self.name));
         }

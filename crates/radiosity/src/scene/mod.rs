@@ -10,6 +10,7 @@
 //! * a two-sided material makes two [`Side`]s of one patch: two receivers and two emitters that share one geometry.
 
 mod check;
+mod cut;
 mod describe;
 mod draft;
 mod emitter;
