@@ -3,12 +3,14 @@
 use serde_json::Value;
 
 /// Our crates, lowest first, each with those of ours that it may use. Nothing may use an application or xtask.
-const OURS: [(&str, &[&str]); 8] = [
+const OURS: [(&str, &[&str]); 9] = [
     ("ondelette-numerics", &[]),
     ("ondelette-wavelet", &["ondelette-numerics"]),
     ("ondelette-compress", &["ondelette-numerics", "ondelette-wavelet"]),
     ("ondelette-radiosity", &["ondelette-numerics", "ondelette-wavelet", "ondelette-compress"]),
     ("ondelette-modeling", &["ondelette-numerics", "ondelette-wavelet"]),
+    // an independent check: it may use scenes and rays, and nothing that solves
+    ("ondelette-verify", &["ondelette-numerics", "ondelette-radiosity"]),
     (
         "ondelette-io",
         &["ondelette-numerics", "ondelette-wavelet", "ondelette-compress", "ondelette-radiosity", "ondelette-modeling"],
@@ -21,6 +23,7 @@ const OURS: [(&str, &[&str]); 8] = [
             "ondelette-compress",
             "ondelette-radiosity",
             "ondelette-modeling",
+            "ondelette-verify",
             "ondelette-io",
         ],
     ),
@@ -41,7 +44,11 @@ const OWNED: [(&str, &[&str], &str); 16] = [
     ("xxhash-rust", &["ondelette-io"], "engines know no file format"),
     ("serde_json", &["ondelette-io", "ondelette", "xtask"], "engines know no file format"),
     ("obvhs", &["ondelette-radiosity"], "rays are the business of light"),
-    ("glam", &["ondelette-radiosity", "ondelette-io", "ondelette"], "bases and links know no space"),
+    (
+        "glam",
+        &["ondelette-radiosity", "ondelette-verify", "ondelette-io", "ondelette"],
+        "bases and links know no space",
+    ),
     ("tracing", &[], "libraries neither print nor log: engines return events"),
     ("log", &[], "libraries neither print nor log: engines return events"),
     ("anyhow", &["xtask"], "errors say what, where, the limit and what to do: an enum beside its function"),
