@@ -2,10 +2,15 @@
 //!
 //! [`axis`] says where a spline lives: boundary, spans, domain; [`basis`] which functions are alive at a parameter.
 //! [`shape`]: curves and surfaces, what they mean as geometry; [`edit`]: handles on every level.
+//! [`energy`], [`constraint`]s and a [`system::Problem`] go to a [`solve::Solver`], which finds the smoothest shape.
 
 pub mod axis;
 pub mod basis;
+pub mod constraint;
 pub mod edit;
+pub mod energy;
 pub mod shape;
+pub mod solve;
+pub mod system;
 
 pub use axis::{Axis, AxisError};

@@ -1,0 +1,111 @@
+//! The bordered system of the multipliers: exact constraints and a null space, with a dense factor.
+//!
+//! For an operator P that stands for the inverse of H off its null space Z, the correction g and multipliers v of
+//! `g = P (r - A^T v) + Z c`, `A g = d`, `Z^T (r - A^T v) = 0` follow from the matrix S = A P A^T (plus 1 / w on soft
+//! rows) and Y = A Z:
+//!
+//! ```text
+//! [ S   -Y ] [ v ]   [ A P r - d ]
+//! [ Y^T  0 ] [ c ] = [ Z^T r     ]
+//! ```
+//!
+//! S is factored with `tau Y Y^T` added, which changes no solution and makes it positive definite.
+
+use super::cholesky::{Cholesky, dot, start};
+
+/// The factored bordered matrix.
+#[derive(Clone, Debug)]
+pub(crate) struct Border {
+    k: usize,
+    tau: f64,
+    /// Y, one column after the other.
+    y: Vec<Vec<f64>>,
+    /// L^-1 Y.
+    u: Vec<Vec<f64>>,
+    factor: Cholesky,
+    /// Cholesky factor of U^T U; pivots of directions that the rows do not see are infinite.
+    small: Vec<f64>,
+    /// Combinations of the null space that no row sees.
+    pub(crate) free: Vec<Vec<f64>>,
+}
+
+impl Border {
+    /// Factors S (packed) with the columns of Y. An error names the first row without a pivot.
+    pub(crate) fn new(mut s: Vec<f64>, m: usize, y: Vec<Vec<f64>>) -> Result<Border, usize> {
+        let k = y.len();
+        let trace: f64 = (0..m).map(|i| s[start(i) + i]).sum();
+        let norm: f64 = y.iter().map(|y| dot(y, y)).sum();
+        let tau = if norm > 0.0 { k as f64 * trace / norm } else { 0.0 };
+        if tau > 0.0 {
+            for i in 0..m {
+                let row = &mut s[start(i)..start(i + 1)];
+                for y in &y {
+                    let by = tau * y[i];
+                    row.iter_mut().zip(y).for_each(|(s, y)| *s += by * y);
+                }
+            }
+        }
+        let factor = Cholesky::new(&s, m)?;
+        let mut border = Border { k, tau, y, u: Vec::new(), factor, small: Vec::new(), free: Vec::new() };
+        border.finish();
+        Ok(border)
+    }
+
+    fn finish(&mut self) {
+        let k = self.k;
+        self.u = self.y.clone();
+        for u in &mut self.u {
+            self.factor.forward(u);
+        }
+        let mut small = vec![0.0; k * k];
+        let sizes: Vec<f64> = self.u.iter().map(|u| dot(u, u)).collect();
+        let most = sizes.iter().fold(0.0, |m: f64, s| m.max(*s));
+        for i in 0..k {
+            for j in 0..=i {
+                let sum: f64 = (0..j).map(|l| small[i * k + l] * small[j * k + l]).sum();
+                let value = dot(&self.u[i], &self.u[j]) - sum;
+                if i != j {
+                    small[i * k + j] = value / small[j * k + j];
+                } else if value > 1e-12 * most.max(f64::MIN_POSITIVE) && value > 1e-10 * sizes[i] {
+                    small[i * k + i] = value.sqrt();
+                } else {
+                    small[i * k + i] = f64::INFINITY;
+                }
+            }
+        }
+        // w = e_i less what the seen directions before it can undo.
+        for i in (0..k).filter(|i| small[i * k + i].is_infinite()) {
+            let mut w = vec![0.0; k];
+            w[i] = 1.0;
+            for j in (0..i).rev().filter(|j| small[j * k + j].is_finite()) {
+                let sum: f64 = (j + 1..=i).map(|l| small[l * k + j] * w[l]).sum();
+                w[j] = -sum / small[j * k + j];
+            }
+            self.free.push(w);
+        }
+        self.small = small;
+    }
+
+    /// Solves for v (over `h`, which holds A P r - d) and c, given `q` = Z^T r.
+    pub(crate) fn solve(&self, h: &mut [f64], q: &[f64], c: &mut [f64]) {
+        let k = self.k;
+        if self.tau > 0.0 {
+            for (y, q) in self.y.iter().zip(q) {
+                h.iter_mut().zip(y).for_each(|(h, y)| *h += self.tau * q * y);
+            }
+        }
+        self.factor.forward(h);
+        for i in 0..k {
+            let sum: f64 = (0..i).map(|l| self.small[i * k + l] * c[l]).sum();
+            c[i] = (q[i] - dot(&self.u[i], h) - sum) / self.small[i * k + i];
+        }
+        for i in (0..k).rev() {
+            let sum: f64 = (i + 1..k).map(|l| self.small[l * k + i] * c[l]).sum();
+            c[i] = (c[i] - sum) / self.small[i * k + i];
+        }
+        for (u, c) in self.u.iter().zip(&*c) {
+            h.iter_mut().zip(u).for_each(|(h, u)| *h += c * u);
+        }
+        self.factor.backward(h);
+    }
+}

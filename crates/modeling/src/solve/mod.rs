@@ -1,0 +1,25 @@
+//! Solvers of variational problems behind one stepped interface.
+//!
+//! [`Solver`] refines: residual of the saddle system, one [`Method`]'s correction, again, until the shape no longer
+//! moves. Residuals of curves are computed with twice the precision, so that every method reaches the last digits.
+
+mod banded;
+mod border;
+mod bpx;
+pub(crate) mod cholesky;
+mod correct;
+mod cosine;
+mod green;
+mod method;
+mod multigrid;
+mod projected;
+mod refine;
+mod solution;
+mod sparse;
+mod spectral;
+mod transfer;
+mod wavelet;
+
+pub use method::{Method, MethodError, Settings};
+pub use refine::{SolveError, Solver, Step};
+pub use solution::{Residual, Solution};

@@ -1,0 +1,422 @@
+//! The stepped solver: blocks one after another, each refined until it no longer moves.
+
+use super::banded::{BandGreen, Banded};
+use super::bpx::Bpx;
+use super::correct::Correct;
+use super::green::Green;
+use super::method::{Method, Settings};
+use super::multigrid::{CycleGreen, Multigrid};
+use super::projected::Projected;
+use super::solution::{Residual, Solution};
+use super::sparse::SparseSolver;
+use super::spectral::Spectral;
+use super::wavelet::WaveletGreen;
+use crate::energy::{Operator, Scratch, twofold};
+use crate::system::{Block, Problem, ProblemError, Structure};
+use ondelette_wavelet::Boundary;
+use std::sync::Arc;
+
+/// Why a problem cannot be solved.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SolveError {
+    /// The constraints contradict each other, or something does not fit.
+    #[error(transparent)]
+    Problem(#[from] ProblemError),
+    /// The method does not apply.
+    #[error("solver {method} does not apply: {why}")]
+    Method {
+        /// The method asked for.
+        method: Method,
+        /// What is missing.
+        why: &'static str,
+    },
+    /// A tolerance that is none.
+    #[error("tolerance {0}: give a number between 1e-15 and 1")]
+    Tolerance(f64),
+    /// Rows that cannot be told apart numerically.
+    #[error("constraint {id} cannot be told apart from those before it: move it, or give it a weight")]
+    Degenerate {
+        /// Its name.
+        id: String,
+    },
+}
+
+/// What a step did.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step {
+    /// Which right-hand side (block of coordinates).
+    pub side: usize,
+    /// Corrections finished for it.
+    pub corrections: usize,
+    /// Iterations so far, all corrections and sides.
+    pub iterations: usize,
+    /// Largest change of the last finished correction, relative to the largest coefficient.
+    pub change: f64,
+}
+
+/// A solver that is stepped by its caller; between two steps its solution is valid, if unfinished.
+///
+/// ```
+/// use ondelette_modeling::constraint::{Constraint, Demand};
+/// use ondelette_modeling::energy::Energy;
+/// use ondelette_modeling::solve::{Settings, Solver};
+/// use ondelette_modeling::system::{Problem, Space};
+/// use ondelette_modeling::Axis;
+/// use ondelette_wavelet::Boundary;
+/// let axis = Axis::new(Boundary::Open, 16, [0.0, 1.0])?;
+/// let point = |t: f64, y: f64| Constraint::new(format!("at {t}"), &[t], Demand::Position(vec![Some(y)]));
+/// let points = vec![point(0.0, 0.0), point(0.5, 1.0), point(1.0, 0.0)];
+/// let problem = Problem::new(Space::curve(axis), 1, Energy::BEND, None, points)?;
+/// let mut solver = Solver::new(problem, Settings::default())?;
+/// while solver.step().is_some() {}
+/// let solution = solver.solution();
+/// assert!(solution.residuals().iter().all(|r| r.miss.abs() < 1e-12));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Solver {
+    problem: Problem,
+    settings: Settings,
+    method: Method,
+    why: &'static str,
+    h: Arc<Operator>,
+    blocks: Vec<(Arc<Structure>, Block)>,
+    notes: Vec<String>,
+    corrector: Option<Box<dyn Correct>>,
+    at: (usize, usize),
+    /// Unknowns and multipliers of every side, block by block.
+    sides: Vec<Vec<SideState>>,
+    stage: Stage,
+    iterations: usize,
+    scratch: Scratch,
+    converged: bool,
+}
+
+#[derive(Clone, Debug, Default)]
+pub(crate) struct SideState {
+    pub(crate) x: Vec<f64>,
+    pub(crate) multipliers: Vec<f64>,
+    corrections: usize,
+    change: f64,
+    miss: f64,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stage {
+    Residual,
+    Correct,
+    Finished,
+}
+
+/// Rows for which multigrid prepares a cycle each, and projects; with more it works by multipliers.
+const CYCLES: usize = 100;
+
+impl Solver {
+    /// Prepares a solver: blocks, the method's rule, redundant rows. The factors are made in the first step.
+    ///
+    /// # Errors
+    /// [`SolveError`].
+    pub fn new(problem: Problem, settings: Settings) -> Result<Solver, SolveError> {
+        if !(1e-15..=1.0).contains(&settings.tolerance) {
+            return Err(SolveError::Tolerance(settings.tolerance));
+        }
+        let rows = problem.rows();
+        let (blocks, redundant) = problem.blocks(rows)?;
+        let h = Arc::new(Operator::new(problem.space(), problem.energy(), problem.stiffness()));
+        let (method, why) = choose(&problem, &h, settings.method)?;
+        let name = |c: &usize| problem.constraints()[*c].id.clone();
+        let notes = redundant
+            .iter()
+            .map(|r| {
+                let others: Vec<String> = r.others.iter().take(8).map(name).collect();
+                format!("constraint {} follows from {}: redundant", name(&r.constraint), others.join(", "))
+            })
+            .collect();
+        let sides = blocks
+            .iter()
+            .map(|b| {
+                let one = |_| SideState {
+                    x: vec![0.0; b.structure.unknowns()],
+                    multipliers: vec![0.0; b.structure.rows()],
+                    change: f64::INFINITY,
+                    miss: f64::INFINITY,
+                    ..SideState::default()
+                };
+                b.sides.iter().map(one).collect()
+            })
+            .collect();
+        let blocks = blocks.into_iter().map(|b| (Arc::new(b.structure.clone()), b)).collect();
+        Ok(Solver {
+            problem,
+            settings,
+            method,
+            why,
+            h,
+            blocks,
+            notes,
+            corrector: None,
+            at: (0, 0),
+            sides,
+            stage: Stage::Residual,
+            iterations: 0,
+            scratch: Scratch::default(),
+            converged: true,
+        })
+    }
+
+    /// The method in use (never [`Method::Auto`]).
+    pub fn method(&self) -> Method {
+        self.method
+    }
+
+    /// Does one bounded piece of work; `None` when there is nothing left to do.
+    ///
+    /// A failed factor (rows that cannot be told apart) ends the solver with a note and without convergence; see
+    /// [`Solver::run`] for the error.
+    pub fn step(&mut self) -> Option<Step> {
+        match self.advance() {
+            Ok(step) => step,
+            Err(e) => {
+                self.notes.push(e.to_string());
+                self.converged = false;
+                self.stage = Stage::Finished;
+                None
+            }
+        }
+    }
+
+    /// Steps to the end.
+    ///
+    /// # Errors
+    /// [`SolveError::Degenerate`].
+    pub fn run(mut self) -> Result<Solution, SolveError> {
+        while self.advance()?.is_some() {}
+        Ok(self.solution())
+    }
+
+    fn advance(&mut self) -> Result<Option<Step>, SolveError> {
+        if self.stage == Stage::Finished {
+            return Ok(None);
+        }
+        let (b, s) = self.at;
+        if b >= self.blocks.len() {
+            self.stage = Stage::Finished;
+            return Ok(None);
+        }
+        if self.blocks[b].0.rows() == 0 {
+            // Nothing is asked: zero is the smoothest.
+            self.at = (b + 1, 0);
+            return self.advance();
+        }
+        if self.corrector.is_none() {
+            self.corrector = Some(self.corrector_of(b)?);
+        }
+        let Some(corrector) = self.corrector.as_mut() else { return Ok(None) };
+        if self.stage == Stage::Residual {
+            if self.sides[b][s].corrections == 0 {
+                corrector.restart();
+            }
+            let exact = corrector.follows_multipliers();
+            let (r1, r2) = residual(&self.h, &self.blocks[b], s, &self.sides[b][s], exact, &mut self.scratch);
+            corrector.begin(&r1, &r2);
+            self.stage = Stage::Correct;
+        }
+        let before = corrector.iterations();
+        let done = corrector.step();
+        self.iterations += corrector.iterations().saturating_sub(before);
+        let stop = self.iterations >= self.settings.most_iterations;
+        if done || stop {
+            self.finish_correction(stop);
+        }
+        let side = &self.sides[b][s];
+        let number = self.sides[..b].iter().map(Vec::len).sum::<usize>() + s;
+        Ok(Some(Step { side: number, corrections: side.corrections, iterations: self.iterations, change: side.change }))
+    }
+
+    /// Adds a finished correction; decides whether another is worth it.
+    fn finish_correction(&mut self, stop: bool) {
+        let (b, s) = self.at;
+        let Some(corrector) = self.corrector.as_ref() else { return };
+        let (dx, dl) = corrector.correction();
+        let finite = dx.iter().all(|v| v.is_finite());
+        let (most, progress) = corrector.patience();
+        let side = &mut self.sides[b][s];
+        let max = |v: &[f64]| v.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+        if finite {
+            side.x.iter_mut().zip(dx).for_each(|(x, d)| *x += d);
+            side.multipliers.iter_mut().zip(dl).for_each(|(l, d)| *l += d);
+        }
+        let size = max(&side.x).max(f64::MIN_POSITIVE);
+        let change = if finite { max(dx) / size } else { f64::INFINITY };
+        let (structure, block) = &self.blocks[b];
+        let targets = &block.sides[s].targets;
+        let mut miss = 0.0_f64;
+        for r in 0..structure.rows() {
+            let soft = structure.give[r] * side.multipliers[r];
+            miss = miss.max((targets[r] - structure.apply_row(r, &side.x) + soft).abs() * structure.lengths[r]);
+        }
+        // The energy of a long curve feels errors far below those of its coefficients.
+        let goal = self.settings.tolerance * if self.h.lines.len() == 1 { 1e-4 } else { 1.0 };
+        let enough = change <= goal && miss <= 2e-14 * size.max(max(targets));
+        let stalled = side.corrections > 0 && change > progress * side.change && miss > progress * side.miss;
+        side.corrections += 1;
+        let last = side.corrections >= most || !finite || stop;
+        let settled = change <= 100.0 * self.settings.tolerance && stalled;
+        if (last || stalled) && !enough && change > self.settings.tolerance && !settled {
+            self.converged = false;
+        }
+        side.change = change;
+        side.miss = miss;
+        self.stage = Stage::Residual;
+        if enough || stalled || last {
+            if s + 1 < self.sides[b].len() {
+                self.at = (b, s + 1);
+            } else {
+                self.at = (b + 1, 0);
+                self.corrector = None;
+            }
+        }
+        if stop {
+            self.stage = Stage::Finished;
+        }
+    }
+
+    fn corrector_of(&mut self, b: usize) -> Result<Box<dyn Correct>, SolveError> {
+        let structure = self.blocks[b].0.clone();
+        let problem = &self.problem;
+        let unfit = |why: &'static str| SolveError::Method { method: self.method, why };
+        let degenerate = |row: usize| {
+            let constraint = self.blocks[b].1.sides[0].constraints[row];
+            SolveError::Degenerate { id: problem.constraints()[constraint].id.clone() }
+        };
+        let (space, energy, map) = (problem.space(), problem.energy(), problem.stiffness());
+        let most = self.settings.most_iterations;
+        let green: Box<dyn Green> = match self.method {
+            Method::Spectral => {
+                Box::new(Spectral::new(&self.h).ok_or_else(|| unfit("it needs mirrored or periodic axes"))?)
+            }
+            Method::Banded => {
+                if let Some(banded) = Banded::new(&self.h, structure.clone()) {
+                    return Ok(Box::new(banded));
+                }
+                let green = BandGreen::new(&self.h, energy.free_degree());
+                Box::new(green.ok_or_else(|| unfit("it is for curves"))?)
+            }
+            Method::Cholesky => {
+                let solver = SparseSolver::new(&self.h, structure);
+                return Ok(Box::new(solver.ok_or_else(|| unfit("the matrix has no factor"))?));
+            }
+            Method::Multigrid if structure.rows() <= CYCLES || space.is_curve() => {
+                let green = CycleGreen::new(space, energy, map, &self.h);
+                Box::new(green.ok_or_else(|| unfit("the spans do not halve often enough"))?)
+            }
+            Method::Multigrid => {
+                let solver = Multigrid::new(space, energy, map, &self.h, structure, 1e-3, most);
+                return Ok(Box::new(solver.ok_or_else(|| unfit("the spans do not halve often enough"))?));
+            }
+            Method::Wavelet => {
+                let green = WaveletGreen::new(space, energy, &self.h, None);
+                Box::new(green.ok_or_else(|| unfit("the axes have no common pyramid"))?)
+            }
+            _ => Box::new(
+                Bpx::new(space, energy, map, &self.h)
+                    .ok_or_else(|| unfit("the spans do not halve often enough: use cholesky"))?,
+            ),
+        };
+        let null = Arc::new(self.h.null_space(problem.energy().free_degree()));
+        let inner = self.settings.tolerance.max(1e-12) * 0.1;
+        let projected = Projected::new(self.h.clone(), structure, green, null, inner, most);
+        projected.map(|p| Box::new(p) as Box<dyn Correct>).map_err(degenerate)
+    }
+
+    /// The solution so far.
+    pub fn solution(&self) -> Solution {
+        let problem = &self.problem;
+        let n = problem.space().len();
+        let mut coefficients = vec![vec![0.0; n]; problem.coordinates()];
+        for ((_, block), sides) in self.blocks.iter().zip(&self.sides) {
+            for (side, state) in block.sides.iter().zip(sides) {
+                for (i, c) in side.coordinates.iter().enumerate() {
+                    coefficients[*c].copy_from_slice(&state.x[i * n..][..n]);
+                }
+            }
+        }
+        let energy = coefficients.iter().map(|x| self.h.energy(x)).sum();
+        let residuals = problem
+            .rows()
+            .iter()
+            .map(|row| {
+                let value: f64 = row.entries().map(|(c, i, v)| v * coefficients[c][i]).sum();
+                let id = problem.constraints()[row.constraint].id.clone();
+                Residual { id, soft: row.give > 0.0, miss: (value - row.target) * row.length }
+            })
+            .collect();
+        Solution::new(
+            problem.space().clone(),
+            coefficients,
+            energy,
+            residuals,
+            (self.method, self.why),
+            self.iterations,
+            self.converged && self.stage == Stage::Finished,
+            self.notes.clone(),
+        )
+    }
+}
+
+/// The rule of [`Method::Auto`], and what each method needs.
+fn choose(problem: &Problem, h: &Operator, asked: Method) -> Result<(Method, &'static str), SolveError> {
+    let axes = problem.space().axes();
+    let waves = h.is_uniform() && axes.iter().all(|a| a.boundary() != Boundary::Open);
+    let unfit = |why| Err(SolveError::Method { method: asked, why });
+    match asked {
+        Method::Auto if waves && !problem.space().is_curve() => {
+            Ok((Method::Spectral, "mirrored or periodic axes of uniform stiffness"))
+        }
+        Method::Auto if problem.space().is_curve() => Ok((Method::Banded, "a curve")),
+        Method::Auto => Ok((Method::Bpx, "open axes or varying stiffness")),
+        Method::Banded if !problem.space().is_curve() => unfit("it is for curves"),
+        Method::Spectral if !waves => unfit("it needs mirrored or periodic axes and uniform stiffness"),
+        method => Ok((method, "asked for")),
+    }
+}
+
+/// What is left of both equations.
+fn residual(
+    h: &Operator,
+    block: &(Arc<Structure>, Block),
+    s: usize,
+    side: &SideState,
+    only_rows: bool,
+    scratch: &mut Scratch,
+) -> (Vec<f64>, Vec<f64>) {
+    let (structure, block) = block;
+    let targets = &block.sides[s].targets;
+    let r2: Vec<f64> = (0..structure.rows())
+        .map(|r| targets[r] - structure.apply_row(r, &side.x) + structure.give[r] * side.multipliers[r])
+        .collect();
+    let mut r1 = vec![0.0; side.x.len()];
+    if only_rows || side.corrections == 0 {
+        return (r1, r2);
+    }
+    let n = structure.n;
+    if h.lines.len() == 1 {
+        let mut sum: Vec<twofold::Twofold> = Vec::with_capacity(side.x.len());
+        for x in side.x.chunks_exact(n) {
+            sum.extend(h.apply_twofold(x).unwrap_or_default());
+        }
+        for (r, l) in side.multipliers.iter().enumerate() {
+            let (columns, values) = structure.row(r);
+            for (c, v) in columns.iter().zip(values) {
+                sum[*c as usize] = twofold::add(sum[*c as usize], twofold::product(*l, *v));
+            }
+        }
+        r1.iter_mut().zip(sum).for_each(|(r, s)| *r = -(s.0 + s.1));
+    } else {
+        for (x, y) in side.x.chunks_exact(n).zip(r1.chunks_exact_mut(n)) {
+            h.apply_exactly(x, y, scratch);
+        }
+        structure.add_transposed(&side.multipliers, 1.0, &mut r1);
+        r1.iter_mut().for_each(|r| *r = -*r);
+    }
+    (r1, r2)
+}

@@ -1,0 +1,102 @@
+//! What a solver hands back.
+
+use super::method::Method;
+use crate::basis;
+use crate::system::Space;
+
+/// How far a constraint row is missed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Residual {
+    /// Name of the constraint.
+    pub id: String,
+    /// True for rows with a weight, which need not be met.
+    pub soft: bool,
+    /// Value minus target, in the units of the constraint.
+    pub miss: f64,
+}
+
+/// Coefficients of a solved problem, with what there is to say about them.
+#[derive(Clone, Debug)]
+pub struct Solution {
+    space: Space,
+    coefficients: Vec<Vec<f64>>,
+    energy: f64,
+    residuals: Vec<Residual>,
+    method: (Method, &'static str),
+    iterations: usize,
+    converged: bool,
+    notes: Vec<String>,
+}
+
+impl Solution {
+    #[allow(clippy::too_many_arguments, reason = "the one constructor, called once")]
+    pub(crate) fn new(
+        space: Space,
+        coefficients: Vec<Vec<f64>>,
+        energy: f64,
+        residuals: Vec<Residual>,
+        method: (Method, &'static str),
+        iterations: usize,
+        converged: bool,
+        notes: Vec<String>,
+    ) -> Solution {
+        Solution { space, coefficients, energy, residuals, method, iterations, converged, notes }
+    }
+
+    /// Where the coefficients live.
+    pub fn space(&self) -> &Space {
+        &self.space
+    }
+
+    /// The B-spline coefficients, coordinate by coordinate; of surfaces row-major (s, t).
+    pub fn coefficients(&self) -> &[Vec<f64>] {
+        &self.coefficients
+    }
+
+    /// The energy, in domain units (soft rows not included).
+    pub fn energy(&self) -> f64 {
+        self.energy
+    }
+
+    /// The miss of every constraint row, in the order of the constraints.
+    pub fn residuals(&self) -> &[Residual] {
+        &self.residuals
+    }
+
+    /// The method, and why it was chosen.
+    pub fn method(&self) -> (Method, &'static str) {
+        self.method
+    }
+
+    /// Iterations of all corrections and coordinates; 0 for direct methods.
+    pub fn iterations(&self) -> usize {
+        self.iterations
+    }
+
+    /// True when the tolerance was reached.
+    pub fn converged(&self) -> bool {
+        self.converged
+    }
+
+    /// Redundant rows and other remarks, a sentence each.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    /// The point at a parameter (`[t]` or `[s, t]`), or a derivative of the given orders, in domain units.
+    ///
+    /// # Panics
+    /// If `at` has another number of parameters than the space has axes.
+    pub fn eval(&self, at: &[f64], derivative: [usize; 2]) -> Vec<f64> {
+        let axes = self.space.axes();
+        assert_eq!(at.len(), axes.len(), "one parameter an axis");
+        let of = |x: &Vec<f64>| match axes {
+            [s, t] => {
+                let (s, t, n) = (basis::taps(s, at[0], derivative[0]), basis::taps(t, at[1], derivative[1]), t.len());
+                s.iter().map(|(i, v)| v * t.apply(&x[i * n..][..n])).sum()
+            }
+            _ => basis::taps(&axes[0], at[0], derivative[0]).apply(x),
+        };
+        self.coefficients.iter().map(of).collect()
+    }
+}

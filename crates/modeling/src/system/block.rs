@@ -1,0 +1,245 @@
+//! Blocks of coordinates that no row couples, as sparse rows.
+
+use super::dependence::{Dependence, dependent};
+use super::{Problem, ProblemError};
+use crate::constraint::{Functional, Row};
+
+/// What blocks with the same rows share: everything but the targets.
+#[derive(Clone, Debug)]
+pub(crate) struct Structure {
+    /// Coefficients of one coordinate.
+    pub(crate) n: usize,
+    /// Coordinates of the block; unknowns are stacked, coordinate by coordinate.
+    pub(crate) k: usize,
+    /// Different functionals of all rows.
+    pub(crate) functionals: Vec<Functional>,
+    /// Per row: `(coordinate, functional, factor)`.
+    pub(crate) terms: Vec<Vec<(usize, usize, f64)>>,
+    /// 1 / weight of soft rows, 0 of hard ones.
+    pub(crate) give: Vec<f64>,
+    /// Lengths of the rows before they were divided.
+    pub(crate) lengths: Vec<f64>,
+    starts: Vec<usize>,
+    columns: Vec<u32>,
+    values: Vec<f64>,
+}
+
+/// A right-hand side of a structure.
+#[derive(Clone, Debug)]
+pub(crate) struct Side {
+    /// Coordinates of the problem that the block's stand for.
+    pub(crate) coordinates: Vec<usize>,
+    /// Constraint of each row.
+    pub(crate) constraints: Vec<usize>,
+    pub(crate) targets: Vec<f64>,
+}
+
+/// Coordinates with the same structure.
+#[derive(Clone, Debug)]
+pub(crate) struct Block {
+    pub(crate) structure: Structure,
+    pub(crate) sides: Vec<Side>,
+}
+
+impl Structure {
+    fn new(n: usize, k: usize, rows: &[Row], local: &dyn Fn(usize) -> usize) -> Structure {
+        let mut out = Structure {
+            n,
+            k,
+            functionals: Vec::new(),
+            terms: Vec::new(),
+            give: rows.iter().map(|r| r.give).collect(),
+            lengths: rows.iter().map(|r| r.length).collect(),
+            starts: vec![0],
+            columns: Vec::new(),
+            values: Vec::new(),
+        };
+        let mut known = std::collections::BTreeMap::new();
+        for row in rows {
+            let mut terms = Vec::with_capacity(row.terms.len());
+            for t in &row.terms {
+                let f = &t.functional;
+                let key = (f.at.map(f64::to_bits), f.derivative);
+                let at = *known.entry(key).or_insert_with(|| {
+                    out.functionals.push(f.clone());
+                    out.functionals.len() - 1
+                });
+                terms.push((local(t.coordinate), at, t.factor));
+            }
+            let mut entries: Vec<(u32, f64)> =
+                row.entries().map(|(c, i, v)| ((local(c) * n + i) as u32, v)).filter(|e| e.1 != 0.0).collect();
+            entries.sort_by_key(|e| e.0);
+            entries.dedup_by(|later, first| {
+                let same = later.0 == first.0;
+                if same {
+                    first.1 += later.1;
+                }
+                same
+            });
+            out.columns.extend(entries.iter().map(|e| e.0));
+            out.values.extend(entries.iter().map(|e| e.1));
+            out.starts.push(out.columns.len());
+            out.terms.push(terms);
+        }
+        out
+    }
+
+    /// Number of rows.
+    pub(crate) fn rows(&self) -> usize {
+        self.terms.len()
+    }
+
+    /// Number of unknowns.
+    pub(crate) fn unknowns(&self) -> usize {
+        self.n * self.k
+    }
+
+    /// Entries of a row: columns and values.
+    pub(crate) fn row(&self, r: usize) -> (&[u32], &[f64]) {
+        let range = self.starts[r]..self.starts[r + 1];
+        (&self.columns[range.clone()], &self.values[range])
+    }
+
+    /// `A x` of one row.
+    pub(crate) fn apply_row(&self, r: usize, x: &[f64]) -> f64 {
+        let (columns, values) = self.row(r);
+        columns.iter().zip(values).map(|(c, v)| v * x[*c as usize]).sum()
+    }
+
+    /// `y = A x`.
+    pub(crate) fn apply(&self, x: &[f64], y: &mut [f64]) {
+        for (r, y) in y.iter_mut().enumerate() {
+            *y = self.apply_row(r, x);
+        }
+    }
+
+    /// `x += by A^T y`.
+    pub(crate) fn add_transposed(&self, y: &[f64], by: f64, x: &mut [f64]) {
+        for (r, y) in y.iter().enumerate() {
+            let (columns, values) = self.row(r);
+            let y = by * y;
+            columns.iter().zip(values).for_each(|(c, v)| x[*c as usize] += y * v);
+        }
+    }
+
+    /// True where every row has one term: no row couples anything.
+    pub(crate) fn is_separable(&self) -> bool {
+        self.terms.iter().all(|t| t.len() == 1)
+    }
+}
+
+/// Rows that follow from others and were left out.
+pub(crate) struct Redundant {
+    pub(crate) constraint: usize,
+    pub(crate) others: Vec<usize>,
+}
+
+impl Problem {
+    /// All linear rows.
+    pub(crate) fn rows(&self) -> Vec<Row> {
+        let mut rows = Vec::new();
+        for (number, c) in self.constraints.iter().enumerate() {
+            c.rows(&self.space, number, &mut rows);
+        }
+        rows
+    }
+
+    /// Cuts rows into blocks; drops redundant rows.
+    ///
+    /// # Errors
+    /// [`ProblemError::Conflict`].
+    pub(crate) fn blocks(&self, rows: Vec<Row>) -> Result<(Vec<Block>, Vec<Redundant>), ProblemError> {
+        let n = self.space.len();
+        // Union of coordinates that share a row.
+        let mut group: Vec<usize> = (0..self.coordinates).collect();
+        for row in &rows {
+            let first = group[row.terms[0].coordinate];
+            for t in &row.terms {
+                let old = group[t.coordinate];
+                group.iter_mut().filter(|g| **g == old).for_each(|g| *g = first);
+            }
+        }
+        let mut sorted: Vec<Vec<Row>> = vec![Vec::new(); self.coordinates];
+        for row in rows {
+            sorted[group[row.terms[0].coordinate]].push(row);
+        }
+        let mut blocks: Vec<(Vec<Row>, Block)> = Vec::new();
+        let mut redundant = Vec::new();
+        for (g, rows) in sorted.into_iter().enumerate() {
+            let coordinates: Vec<usize> = (0..self.coordinates).filter(|c| group[*c] == g).collect();
+            if coordinates.is_empty() {
+                continue;
+            }
+            let side = |rows: &[Row], coordinates: Vec<usize>| Side {
+                coordinates,
+                constraints: rows.iter().map(|r| r.constraint).collect(),
+                targets: rows.iter().map(|r| r.target).collect(),
+            };
+            // The same rows on another coordinate?
+            if coordinates.len() == 1
+                && let Some((first, block)) =
+                    blocks.iter_mut().find(|(first, b)| b.structure.k == 1 && same(first, &rows))
+            {
+                let _ = first;
+                let kept: Vec<Row> = self.independent(&rows, n, &mut Vec::new(), &coordinates)?;
+                block.sides.push(side(&kept, coordinates));
+                continue;
+            }
+            let kept = self.independent(&rows, n, &mut redundant, &coordinates)?;
+            let of = |c: usize| coordinates.iter().position(|x| *x == c).unwrap_or(0);
+            let structure = Structure::new(n, coordinates.len(), &kept, &of);
+            let sides = vec![side(&kept, coordinates.clone())];
+            blocks.push((rows, Block { structure, sides }));
+        }
+        Ok((blocks.into_iter().map(|b| b.1).collect(), redundant))
+    }
+
+    /// The rows without those that follow from others.
+    fn independent(
+        &self,
+        rows: &[Row],
+        n: usize,
+        redundant: &mut Vec<Redundant>,
+        coordinates: &[usize],
+    ) -> Result<Vec<Row>, ProblemError> {
+        let of = |c: usize| coordinates.iter().position(|x| *x == c).unwrap_or(0);
+        let found: Vec<Dependence> = dependent(rows, n, &of);
+        if found.is_empty() {
+            return Ok(rows.to_vec());
+        }
+        let mut drop = vec![false; rows.len()];
+        for d in found {
+            let row = &rows[d.row];
+            let size = d.parts.iter().fold(row.target.abs(), |m, (r, c)| m.max((c * rows[*r].target).abs()));
+            let miss = row.target - d.parts.iter().map(|(r, c)| c * rows[*r].target).sum::<f64>();
+            let mut others: Vec<usize> = d.parts.iter().map(|(r, _)| rows[*r].constraint).collect();
+            others.sort_unstable();
+            others.dedup();
+            if miss.abs() > 1e-9 * size {
+                let names: Vec<&str> = others.iter().take(8).map(|c| self.constraints[*c].id.as_str()).collect();
+                return Err(ProblemError::Conflict {
+                    id: self.constraints[row.constraint].id.clone(),
+                    others: names.join(", "),
+                    miss: miss.abs() * row.length,
+                });
+            }
+            drop[d.row] = true;
+            redundant.push(Redundant { constraint: row.constraint, others });
+        }
+        Ok(rows.iter().zip(drop).filter(|(_, d)| !d).map(|(r, _)| r.clone()).collect())
+    }
+}
+
+/// True where the rows differ in nothing but targets and the coordinate they belong to.
+fn same(a: &[Row], b: &[Row]) -> bool {
+    a.len() == b.len()
+        && a.iter().zip(b).all(|(a, b)| {
+            a.give.to_bits() == b.give.to_bits()
+                && a.terms.len() == b.terms.len()
+                && a.terms.iter().zip(&b.terms).all(|(s, t)| {
+                    s.functional.at == t.functional.at
+                        && s.functional.derivative == t.functional.derivative
+                        && s.factor.to_bits() == t.factor.to_bits()
+                })
+        })
+}
