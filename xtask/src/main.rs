@@ -1,10 +1,12 @@
-//! The checks that CI and contributors run.
+//! The checks and benchmarks that CI and contributors run.
 //!
 //! ```text
 //! cargo xtask ci        everything, as .ci/run does
 //! cargo xtask layers    the architecture alone: who may depend on whom, and the habits a compiler does not check
+//! cargo xtask bench light   what lighting the scenes of bench/scenes costs, and how good the result is
 //! ```
 
+mod bench;
 mod ci;
 mod layers;
 mod links;
@@ -19,8 +21,9 @@ fn main() -> ExitCode {
     let result = match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         ["ci"] => ci::run(&root),
         ["layers"] => ci::layers(&root),
+        ["bench", "light"] => bench::light(&root),
         _ => {
-            eprintln!("usage: cargo xtask ci | layers");
+            eprintln!("usage: cargo xtask ci | layers | bench light");
             return ExitCode::from(2);
         }
     };
