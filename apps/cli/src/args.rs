@@ -56,6 +56,11 @@ pub(crate) struct LightArgs {
     #[arg(long, default_value = "m2", value_name = "NAME", allow_hyphen_values = true)]
     pub(crate) basis: String,
 
+    /// How light is transported: sampled (direct light exact, reflected light by sampled rows of the transport
+    /// operator; scenes of any size) or wavelet (wavelet links between all pairs of surfaces; a few thousand surfaces)
+    #[arg(long, default_value = "sampled", value_name = "NAME", allow_hyphen_values = true)]
+    pub(crate) method: String,
+
     /// Mean absolute error of the irradiance that is allowed, in per cent of its mean: 1%, 0.5, 3%
     #[arg(long, default_value = "1%", value_name = "PERCENT", allow_hyphen_values = true)]
     pub(crate) error: String,

@@ -59,6 +59,7 @@ impl Progress {
         }
         let what = match event {
             Event::Linking { done, total } => format!("linking, {done} of {total} pairs"),
+            Event::Gathering { done, total } => format!("gathering, {done} of {total} elements"),
             Event::Refining { done, total } => format!("refining, {done} of {total} pairs"),
             Event::Iterated { iterations, residual, .. } => {
                 format!("balancing, sweep {iterations}, rest {residual:.1e}")

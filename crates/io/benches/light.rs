@@ -10,7 +10,8 @@ use std::time::Instant;
 fn main() {
     println!("{:>6} {:>8} {:>9} {:>9} {:>9} {:>11}", "basis", "error", "seconds", "links", "elements", "rays");
     for (basis, error) in [("haar", 0.05), ("m2", 0.05), ("m2", 0.03), ("m2", 0.01), ("m3", 0.03), ("m3", 0.01)] {
-        let settings = Settings { basis: basis.parse().expect("a basis of the list above"), error };
+        let settings =
+            Settings { basis: basis.parse().expect("a basis of the list above"), error, ..Settings::default() };
         let mut seconds = Vec::new();
         let mut counts = (0, 0, 0);
         for _ in 0..3 {

@@ -2,7 +2,7 @@
 
 use ondelette_io::onl::{ChunkFile, ChunkWriter, OnlError, solution_bytes, solution_of};
 use ondelette_radiosity::scene::samples;
-use ondelette_radiosity::{Rgb, Scene, Settings, Solution, Solver};
+use ondelette_radiosity::{Method, Rgb, Scene, Settings, Solution, Solver};
 use proptest::prelude::*;
 use std::collections::BTreeSet;
 use std::sync::OnceLock;
@@ -23,7 +23,8 @@ fn corner() -> Scene {
 }
 
 fn solve(basis: &str, error: f64) -> Solution {
-    let mut solver = Solver::new(corner(), Settings { basis: basis.parse().unwrap(), error }).unwrap();
+    let mut solver =
+        Solver::new(corner(), Settings { basis: basis.parse().unwrap(), method: Method::Wavelet, error }).unwrap();
     while solver.step().is_some() {}
     solver.solution()
 }

@@ -7,6 +7,7 @@ use crate::kernel::LightKernel;
 use crate::rgb::Rgb;
 use crate::solution::Solution;
 use ondelette_numerics::par;
+use ondelette_wavelet::cell::CellShape;
 use serde::{Deserialize, Serialize};
 
 /// Powers, in the scene's power unit times (scene units / metre)^2.
@@ -22,6 +23,24 @@ pub struct Ledger {
     pub escaped: Rgb,
     /// Rays counted.
     pub rays: u64,
+}
+
+/// Points an axis at which the lit part of an element is looked for.
+const LOOKS: u32 = 8;
+
+/// Mean irradiance of an element that is partly inside of something, where it is dark.
+fn lit_mean(solution: &Solution, kernel: &LightKernel, leaf: usize, side: usize) -> Rgb {
+    let cell = solution.forest().nodes()[leaf].cell;
+    let mut sum = Rgb::BLACK;
+    for i in 0..LOOKS * LOOKS {
+        let at = [i % LOOKS, i / LOOKS].map(|k| (f64::from(k) + 0.5) / f64::from(LOOKS));
+        let folded = cell.shape == CellShape::Triangle && at[0] + at[1] > 1.0;
+        let at = cell.to_root(if folded { [1.0 - at[0], 1.0 - at[1]] } else { at });
+        if !kernel.is_buried(side, solution.point(side, at)) {
+            sum += solution.irradiance(side, at);
+        }
+    }
+    sum * (1.0 / f64::from(LOOKS * LOOKS))
 }
 
 /// One ray's end: power and what it met.
@@ -52,6 +71,7 @@ impl Ledger {
         let mut leaves = Vec::new();
         let mut whole = 0.0;
         solution.each_leaf(|leaf, side, area, mean| {
+            let mean = if solution.lit()[leaf] < 1.0 { lit_mean(solution, &kernel, leaf, side) } else { mean };
             let material = scene.material(scene.sides[side]);
             let exitance = material.radiance * std::f64::consts::PI;
             ledger.emitted += exitance * area;
@@ -79,12 +99,16 @@ impl Ledger {
                 let cell = solution.forest().nodes()[leaf].cell;
                 let frame = &kernel.sides()[side];
                 let mut local = [u[0], u[1]];
-                if frame.shape == ondelette_wavelet::cell::CellShape::Triangle && u[0] + u[1] > 1.0 {
+                if frame.shape == CellShape::Triangle && u[0] + u[1] > 1.0 {
                     local = [1.0 - u[0], 1.0 - u[1]];
                 }
                 let at = cell.to_root(local);
-                let weight = solution.radiosity(side, at) * (area / power * whole / rays as f64);
                 let from = solution.point(side, at);
+                let lit = solution.lit()[leaf];
+                if lit < 1.0 && (lit == 0.0 || kernel.is_buried(side, from)) {
+                    continue;
+                }
+                let weight = solution.radiosity(side, at) * (area / power * whole / rays as f64);
                 let tangent = frame.edges[0].normalize();
                 let bitangent = frame.normal.cross(tangent);
                 let (sine, angle) = (u[2].sqrt(), std::f64::consts::TAU * u[3]);

@@ -6,6 +6,7 @@ pub mod ledger;
 pub mod occluder;
 pub mod probe;
 mod rgb;
+mod sampled;
 pub mod scene;
 pub mod settings;
 pub mod solution;
@@ -15,6 +16,6 @@ pub mod visible;
 
 pub use rgb::Rgb;
 pub use scene::Scene;
-pub use settings::{Basis, Settings};
+pub use settings::{Basis, Method, Settings};
 pub use solution::{Solution, Statistics};
 pub use solver::{Event, SolveError, Solver};

@@ -71,6 +71,17 @@ impl<'a> Prober<'a> {
         best.map(|(_, side, at)| (side, at))
     }
 
+    /// Irradiance at side-local coordinates, exactly 0 inside of things: [`Solution::irradiance`] with a look around on
+    /// elements that are only partly lit.
+    pub fn irradiance(&self, side: usize, at: [f64; 2]) -> Rgb {
+        let (leaf, _) = self.solution.forest().locate(side, at);
+        let lit = self.solution.lit()[leaf.index()];
+        if lit < 1.0 && (lit == 0.0 || self.kernel.is_buried(side, self.solution.point(side, at))) {
+            return Rgb::BLACK;
+        }
+        self.solution.irradiance(side, at)
+    }
+
     /// Irradiance at a free point with a unit normal, gathered from the solved scene: elements in closed form, their
     /// visibility by rays keyed by point and element.
     pub fn gather(&self, point: DVec3, normal: DVec3) -> Rgb {

@@ -72,18 +72,56 @@ impl FromStr for Basis {
     }
 }
 
+/// How light is transported.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Method {
+    /// Direct light exact, indirect light by sampled rows of the operator: scenes of any size.
+    #[default]
+    Sampled,
+    /// Wavelet links between pairs of elements.
+    Wavelet,
+}
+
+impl fmt::Display for Method {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Method::Sampled => "sampled",
+            Method::Wavelet => "wavelet",
+        })
+    }
+}
+
+/// A name that is no method.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("'{0}' is no method: choose sampled or wavelet")]
+pub struct MethodError(pub String);
+
+impl FromStr for Method {
+    type Err = MethodError;
+
+    fn from_str(name: &str) -> Result<Self, MethodError> {
+        match name {
+            "sampled" => Ok(Method::Sampled),
+            "wavelet" => Ok(Method::Wavelet),
+            _ => Err(MethodError(name.to_string())),
+        }
+    }
+}
+
 /// Settings of a solution; the same settings and scene give the same bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
     /// Basis on every side.
     pub basis: Basis,
+    /// How light is transported.
+    pub method: Method,
     /// Promised error: area-weighted mean absolute error of the irradiance over its area-weighted mean, as a fraction.
     pub error: f64,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Settings { basis: Basis::M2, error: 0.01 }
+        Settings { basis: Basis::M2, method: Method::Sampled, error: 0.01 }
     }
 }
 

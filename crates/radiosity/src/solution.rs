@@ -38,6 +38,8 @@ pub struct Solution {
     links: Links,
     irradiance: Vec<[f64; 3]>,
     statistics: Statistics,
+    /// Share of each node that is not inside of something.
+    lit: Vec<f32>,
 }
 
 impl Solution {
@@ -55,7 +57,25 @@ impl Solution {
     ) -> Self {
         assert_eq!(irradiance.len(), forest.len() * forest.stride());
         assert_eq!(forest.roots().len(), scene.sides.len());
-        Solution { scene, settings, forest, links, irradiance, statistics }
+        let lit = vec![1.0; forest.len()];
+        Solution { scene, settings, forest, links, irradiance, statistics, lit }
+    }
+
+    /// Says which share of each leaf is not inside of something (a floor under a box): the rest is dark, and no part of
+    /// the leaf's function.
+    ///
+    /// # Panics
+    /// If there is not one share a node.
+    #[must_use]
+    pub fn with_lit(mut self, lit: Vec<f32>) -> Self {
+        assert_eq!(lit.len(), self.forest.len());
+        self.lit = lit;
+        self
+    }
+
+    /// Shares of the nodes that are not inside of something; 1 but for some leaves.
+    pub fn lit(&self) -> &[f32] {
+        &self.lit
     }
 
     /// The scene.
@@ -154,7 +174,7 @@ impl Solution {
             if node.first_child == 0 {
                 let own = &self.irradiance[n * stride..(n + 1) * stride];
                 let mean = self.forest.basis(node.cell.shape).mean(own, [0.0; 3], |a, b, k| (Rgb(a) + Rgb(b) * k).0);
-                f(n, node.cell.root as usize, node.measure, Rgb(mean));
+                f(n, node.cell.root as usize, node.measure, Rgb(mean) * f64::from(self.lit[n]));
             }
         }
     }

@@ -3,11 +3,11 @@
 use glam::DVec3;
 use ondelette_radiosity::ledger::Ledger;
 use ondelette_radiosity::scene::samples;
-use ondelette_radiosity::{Basis, Rgb, Scene, Settings, Solution, Solver};
+use ondelette_radiosity::{Basis, Method, Rgb, Scene, Settings, Solution, Solver};
 
 fn solve(scene: Scene, basis: &str, error: f64) -> Solution {
     let basis: Basis = basis.parse().unwrap();
-    let mut solver = Solver::new(scene, Settings { basis, error }).unwrap();
+    let mut solver = Solver::new(scene, Settings { basis, method: Method::Wavelet, error }).unwrap();
     while solver.step().is_some() {}
     let solution = solver.solution();
     assert!(solution.is_finished());

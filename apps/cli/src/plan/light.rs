@@ -106,7 +106,8 @@ impl LightPlan {
     /// Judges every flag, and whether named outputs can be written.
     pub(crate) fn new(args: &LightArgs) -> Result<Self, Refusal> {
         let basis = args.basis.parse().map_err(|e| Refusal::new(format!("--basis: {e}")))?;
-        let settings = Settings { basis, error: values::percent(&args.error)? };
+        let method = args.method.parse().map_err(|e| Refusal::new(format!("--method: {e}")))?;
+        let settings = Settings { basis, method, error: values::percent(&args.error)? };
         let settings = settings.validated().map_err(|e| Refusal::new(format!("--error: {e}")))?;
         let mut named = args.outputs.iter().map(|path| Output::new(path)).collect::<Result<Vec<_>, _>>()?;
         named.sort_by_key(|o| o.kind);

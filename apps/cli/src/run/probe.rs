@@ -86,7 +86,10 @@ fn answer(solution: &Solution, points: &[Point], gather: bool) -> Vec<Option<Ans
                 return Some((prober.gather(position, normal).0, None));
             }
             let (side, at) = prober.find(position, normal)?;
-            Some((solution.irradiance(side, at).0, Some(solution.radiosity(side, at).0)))
+            let irradiance = prober.irradiance(side, at);
+            let material = solution.scene().material(solution.scene().sides[side]);
+            let radiosity = material.radiance * std::f64::consts::PI + material.reflectance * irradiance;
+            Some((irradiance.0, Some(radiosity.0)))
         };
         own.iter().map(one).collect::<Vec<_>>()
     });

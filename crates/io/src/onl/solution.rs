@@ -89,6 +89,9 @@ fn chunks(solution: &Solution) -> ChunkWriter {
     writer.add_struct("counts", solution.statistics()).expect(encodable);
     writer.add_array("splits", &splits(forest));
     writer.add_array("coeffs", solution.coefficients().as_flattened());
+    if solution.lit().iter().any(|l| *l != 1.0) {
+        writer.add_array("lit", solution.lit());
+    }
     writer.add_array("links", &links);
     writer.add_array("blocks", solution.links().blocks());
     writer
@@ -122,7 +125,16 @@ pub fn solution_of(file: &ChunkFile) -> Result<Solution, OnlError> {
     }
     let (forest, coefficients) = forest_of(file, &scene, settings)?;
     let links = links_of(file, &forest)?;
-    Ok(Solution::new(Arc::new(scene), settings, forest, links, coefficients, statistics))
+    let nodes = forest.len();
+    let solution = Solution::new(Arc::new(scene), settings, forest, links, coefficients, statistics);
+    if !file.has("lit") {
+        return Ok(solution);
+    }
+    let lit: Vec<f32> = file.array("lit")?;
+    if lit.len() != nodes || !lit.iter().all(|l| (0.0..=1.0).contains(l)) {
+        return Err(file.content("lit", format!("not {nodes} shares between 0 and 1")));
+    }
+    Ok(solution.with_lit(lit))
 }
 
 fn forest_of(file: &ChunkFile, scene: &Scene, settings: Settings) -> Result<(Forest, Vec<[f64; 3]>), OnlError> {

@@ -153,7 +153,8 @@ mod tests {
     use ondelette_radiosity::{Scene, Settings, Solver};
 
     fn solve(scene: Scene, basis: &str) -> Solution {
-        let mut solver = Solver::new(scene, Settings { basis: basis.parse().unwrap(), error: 0.1 }).unwrap();
+        let mut solver =
+            Solver::new(scene, Settings { basis: basis.parse().unwrap(), error: 0.1, ..Settings::default() }).unwrap();
         while solver.step().is_some() {}
         solver.solution()
     }

@@ -39,6 +39,16 @@ impl Element {
         }
     }
 
+    /// Area.
+    pub fn area(&self) -> f64 {
+        self.area
+    }
+
+    /// Square or triangle.
+    pub fn shape(&self) -> CellShape {
+        self.shape
+    }
+
     /// Unit normal of the front.
     pub fn normal(&self) -> DVec3 {
         self.normal

@@ -9,6 +9,7 @@
 //! [`SideFrame`] and [`Element`] (where things are) -> pieces (a source split towards a point) -> pairs (moments and
 //! masks) -> [`LightKernel`] (what the links are made of).
 
+mod buried;
 mod cover;
 mod element;
 mod pair;
@@ -130,6 +131,16 @@ impl LightKernel {
     /// Whether a later, coplanar side that faces the same way covers a point of a side.
     pub fn is_covered(&self, side: usize, point: DVec3) -> bool {
         self.covers[side].iter().any(|&top| self.sides[top as usize].holds(point))
+    }
+
+    /// The later, coplanar sides that cover parts of a side.
+    pub fn covers_of(&self, side: usize) -> &[u32] {
+        &self.covers[side]
+    }
+
+    /// Whether anything covers a part of a side.
+    pub fn has_covers(&self, side: usize) -> bool {
+        !self.covers[side].is_empty()
     }
 
     /// Visibility rays cast so far: a sum, the same in whatever order the threads add to it.

@@ -6,6 +6,7 @@
 //! The unknown is the irradiance E of each side: E = K (M + rho E), with M = pi L the exitance of emitters. Reflectance
 //! multiplies at the shooter when light leaves again, so three colours share one set of links.
 
+use super::{Event, SolveError};
 use crate::kernel::{LightKernel, SideFrame};
 use crate::rgb::Rgb;
 use crate::scene::Scene;
@@ -14,68 +15,6 @@ use crate::solution::{Solution, Statistics};
 use ondelette_compress::{CoupleSettings, End, Estimate, Forest, Link, Links, Magnitudes, Refinement, Task, transport};
 use ondelette_numerics::krylov::Gmres;
 use std::sync::Arc;
-
-/// What a step did. Counts and residuals only: whoever listens adds the clock.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Event {
-    /// Pairs of sides were looked at.
-    Linking {
-        /// Pairs done.
-        done: usize,
-        /// Pairs in all.
-        total: usize,
-    },
-    /// One sweep over all links.
-    Iterated {
-        /// Sweeps so far.
-        iterations: u64,
-        /// Relative residual.
-        residual: f64,
-        /// Residual at which this solve ends.
-        wanted: f64,
-    },
-    /// The light is balanced on the present links, and its error estimated.
-    Solved {
-        /// Estimated error, relative to the mean irradiance.
-        error: f64,
-        /// Links.
-        links: usize,
-        /// Leaf elements.
-        elements: usize,
-    },
-    /// Links were refined.
-    Refining {
-        /// Pairs done.
-        done: usize,
-        /// Pairs in this batch.
-        total: usize,
-    },
-}
-
-/// Why a scene cannot be solved.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum SolveError {
-    /// No light.
-    #[error(
-        "the scene '{0}' has no emitter, so there is nothing to solve: \
-         give a material an emission (OBJ: Ke, glTF: emissiveFactor)"
-    )]
-    NoEmitter(String),
-    /// Too large for all-pairs initial linking.
-    #[error(
-        "the scene has {sides} sides and this version links at most {most}: \
-         clustering of many small faces is not there yet"
-    )]
-    TooManySides {
-        /// Sides in the scene.
-        sides: usize,
-        /// The limit.
-        most: usize,
-    },
-    /// The settings make no sense.
-    #[error(transparent)]
-    Settings(#[from] crate::settings::SettingsError),
-}
 
 enum Phase {
     Linking(Refinement),
@@ -86,18 +25,8 @@ enum Phase {
     Finished,
 }
 
-/// Steps from a scene to its light.
-///
-/// ```
-/// use ondelette_radiosity::{Settings, Solver, scene::samples};
-/// let mut solver = Solver::new(samples::facing_squares(1.0), Settings::default()).unwrap();
-/// while solver.step().is_some() {}
-/// let solution = solver.solution();
-/// assert!(solution.is_finished());
-/// // the whole square receives the form factor 0.1998 of what the other emits
-/// assert!((solution.mean_irradiance(0).0[0] - 0.199824895698387).abs() < 2e-3);
-/// ```
-pub struct Solver {
+/// The stepped solver.
+pub(super) struct Linked {
     scene: Arc<Scene>,
     settings: Settings,
     kernel: LightKernel,
@@ -120,7 +49,7 @@ pub struct Solver {
 }
 
 /// Sides up to which all pairs are linked.
-pub const MOST_SIDES: usize = 6_000;
+pub(super) const MOST_SIDES: usize = 6_000;
 /// Work a step, in units of a few ten microseconds: some ten milliseconds in all.
 const WORK_A_STEP: usize = 1024;
 /// Rays of a receiver point in the first, coarse linking.
@@ -138,16 +67,12 @@ const CARRIED_SWEEPS: usize = 4;
 /// Deepest split.
 const DEEPEST: u32 = 16;
 
-impl Solver {
+impl Linked {
     /// Prepares a scene. Nothing is linked yet.
     ///
     /// # Errors
     /// See [`SolveError`].
-    pub fn new(scene: Scene, settings: Settings) -> Result<Self, SolveError> {
-        let settings = settings.validated()?;
-        if !scene.has_emitter() {
-            return Err(SolveError::NoEmitter(scene.name));
-        }
+    pub(super) fn new(scene: Scene, settings: Settings) -> Result<Self, SolveError> {
         if scene.sides.len() > MOST_SIDES {
             return Err(SolveError::TooManySides { sides: scene.sides.len(), most: MOST_SIDES });
         }
@@ -169,7 +94,7 @@ impl Solver {
                 }
             }
         }
-        Ok(Solver {
+        Ok(Linked {
             scene: Arc::new(scene),
             settings,
             kernel,
@@ -188,13 +113,13 @@ impl Solver {
     }
 
     /// The scene being solved.
-    pub fn scene(&self) -> &Arc<Scene> {
+    pub(super) fn scene(&self) -> &Arc<Scene> {
         &self.scene
     }
 
     /// Does a bounded piece of work; `None` when the promise is kept, or when nothing is left to refine
     /// ([`Statistics::finished`] says which).
-    pub fn step(&mut self) -> Option<Event> {
+    pub(super) fn step(&mut self) -> Option<Event> {
         match std::mem::replace(&mut self.phase, Phase::Finished) {
             Phase::Linking(batch) => {
                 Some(self.work(batch, |done, total| Event::Linking { done, total }, Phase::Linking))
@@ -211,7 +136,7 @@ impl Solver {
     }
 
     /// The state as it stands, valid after any step.
-    pub fn solution(&self) -> Solution {
+    pub(super) fn solution(&self) -> Solution {
         let mut statistics = self.statistics.clone();
         statistics.estimated_error = self.error;
         statistics.finished = matches!(self.phase, Phase::Finished) && !self.stalled;
@@ -226,7 +151,7 @@ impl Solver {
     }
 
     /// The state as it stands, without a copy: for the end.
-    pub fn into_solution(mut self) -> Solution {
+    pub(super) fn into_solution(mut self) -> Solution {
         self.statistics.estimated_error = self.error;
         self.statistics.finished = matches!(self.phase, Phase::Finished) && !self.stalled;
         Solution::new(self.scene, self.settings, self.forest, self.links, self.irradiance, self.statistics)

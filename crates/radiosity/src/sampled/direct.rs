@@ -1,0 +1,216 @@
+//! Direct light: each element's light from the lamps, fitted at points where it is known exactly.
+//!
+//! Where nothing stands between, the light is smooth: interpolation at Gauss points, judged at test points. Where
+//! something may, it has edges: least squares over a fine grid, judged by its own residuals.
+
+use super::lamps::Lamps;
+use crate::kernel::LightKernel;
+use crate::rgb::Rgb;
+use crate::visible::View;
+use ondelette_compress::{Cell, Forest};
+use ondelette_numerics::seed;
+use ondelette_wavelet::cell::{CellBasis, CellShape};
+
+/// Direct light of one element.
+#[derive(Clone, Debug)]
+pub(super) struct Fit {
+    /// For unit exitance of each group of lamps, `[group][function]`.
+    pub(super) coefficients: Vec<f64>,
+    /// Mean absolute value of what the functions cannot say, channels summed.
+    pub(super) misfit: f64,
+    /// Root mean square scatter of the fit, where rays decided what is seen, channels summed.
+    pub(super) scatter: f64,
+    /// Share of the element that is not inside of something.
+    pub(super) lit: f64,
+}
+
+/// A fit to samples on a grid, by least squares.
+#[derive(Clone, Debug)]
+pub(super) struct Grid {
+    points: Vec<[f64; 2]>,
+    /// Functions at the points, `[point][function]`.
+    values: Vec<f64>,
+    /// Samples to coefficients, `[function][point]`.
+    matrix: Vec<f64>,
+}
+
+impl Grid {
+    /// The grid of a basis: four points an axis, or two a function and axis.
+    pub(super) fn of(basis: &CellBasis) -> Self {
+        let per_axis = (2 * basis.order()).max(4);
+        let at = |i: usize| (i as f64 + 0.5) / per_axis as f64;
+        let mut points = Vec::new();
+        for j in 0..per_axis {
+            for i in 0..per_axis {
+                if basis.shape() == CellShape::Triangle {
+                    // midpoints of the small triangles, upright and turned
+                    let third = 1.0 / (3.0 * per_axis as f64);
+                    let corner = [i as f64 / per_axis as f64, j as f64 / per_axis as f64];
+                    if i + j < per_axis {
+                        points.push([corner[0] + third, corner[1] + third]);
+                    }
+                    if i + j + 1 < per_axis {
+                        points.push([corner[0] + 2.0 * third, corner[1] + 2.0 * third]);
+                    }
+                } else {
+                    points.push([at(i), at(j)]);
+                }
+            }
+        }
+        let n = basis.len();
+        let mut values = vec![0.0; points.len() * n];
+        for (x, row) in points.iter().zip(values.chunks_mut(n)) {
+            basis.eval(*x, row);
+        }
+        let mut gram = vec![0.0; n * n];
+        for row in values.chunks(n) {
+            for i in 0..n {
+                for j in 0..n {
+                    gram[i * n + j] += row[i] * row[j];
+                }
+            }
+        }
+        let inverse = super::gather::inverse(gram, n);
+        let mut matrix = vec![0.0; n * points.len()];
+        for i in 0..n {
+            for (q, row) in values.chunks(n).enumerate() {
+                matrix[i * points.len() + q] = (0..n).map(|j| inverse[i * n + j] * row[j]).sum();
+            }
+        }
+        Grid { points, values, matrix }
+    }
+
+    /// Samples to coefficients by the `lit` points alone; what they leave open is pulled to their mean.
+    fn part(&self, lit: &[bool], n: usize) -> Vec<f64> {
+        let count = self.points.len();
+        let alive = lit.iter().filter(|l| **l).count();
+        if alive == 0 {
+            return vec![0.0; n * count];
+        }
+        let share = 1.0 / alive as f64;
+        let mut gram = vec![0.0; n * n];
+        for (row, _) in self.values.chunks(n).zip(lit).filter(|(_, lit)| **lit) {
+            for i in 0..n {
+                for j in 0..n {
+                    gram[i * n + j] += share * row[i] * row[j];
+                }
+            }
+        }
+        // coefficients of the constant 1, and what it leaves
+        let one: Vec<f64> = self.matrix.chunks(count).map(|row| row.iter().sum()).collect();
+        let constant: Vec<f64> = (0..n).map(|i| (0..n).map(|j| gram[i * n + j] * one[j]).sum()).collect();
+        (0..n).for_each(|i| gram[i * n + i] += 1e-4);
+        let inverse = super::gather::inverse(gram, n);
+        let mut matrix = vec![0.0; n * count];
+        for i in 0..n {
+            let inverse = &inverse[i * n..(i + 1) * n];
+            let rest = one[i] - inverse.iter().zip(&constant).map(|(a, b)| a * b).sum::<f64>();
+            for (q, row) in self.values.chunks(n).enumerate().filter(|(q, _)| lit[*q]) {
+                let fitted = inverse.iter().zip(row).map(|(a, b)| a * b).sum::<f64>();
+                matrix[i * count + q] = share * (fitted + rest);
+            }
+        }
+        matrix
+    }
+}
+
+/// A misfit below this many of its standard deviations is taken for scatter.
+const SIGNIFICANT: f64 = 1.0;
+
+/// Fits the light of the lamps on a cell; `grid` is that of the cell's basis, and a point sends about `rays` to all
+/// lamps together that it may see past many things.
+pub(super) fn fit(kernel: &LightKernel, lamps: &Lamps, forest: &Forest, grid: &Grid, cell: &Cell, rays: f64) -> Fit {
+    let groups = lamps.groups.len();
+    let basis = forest.basis(cell.shape);
+    let n = basis.len();
+    let seen = lamps.seen_by(kernel, cell, rays);
+    let element = kernel.element(cell);
+    let is_buried = |x: [f64; 2]| kernel.is_buried(cell.root as usize, element.point(x));
+    if seen.is_empty() {
+        let open = grid.points.iter().filter(|x| !is_buried(**x)).count();
+        let lit = open as f64 / grid.points.len() as f64;
+        return Fit { coefficients: vec![0.0; groups * n], misfit: 0.0, scatter: 0.0, lit };
+    }
+    let masked = seen.iter().any(|s| s.is_masked()) || kernel.has_covers(cell.root as usize);
+    let mut view = View::new(kernel.occluders().tolerance());
+    // values of both halves at the points, `[group][point]`
+    let sample = |view: &mut View, points: &mut dyn Iterator<Item = [f64; 2]>, count: usize| {
+        let mut values = vec![[0.0; 2]; groups * count];
+        let mut out = vec![[0.0; 2]; groups];
+        for (q, local) in points.enumerate() {
+            let x = element.point(local);
+            out.fill([0.0; 2]);
+            if !kernel.is_covered(cell.root as usize, x) {
+                let at = (cell.root as usize, x, element.normal());
+                lamps.irradiance(kernel, view, &seen, at, seed::combine(cell.key, q as u64), &mut out);
+            }
+            for (g, o) in out.iter().enumerate() {
+                values[g * count + q] = *o;
+            }
+        }
+        values
+    };
+    let exitance = |g: usize| lamps.groups[g].1;
+    let mut coefficients = Vec::with_capacity(groups * n);
+    if !masked {
+        let analysis = basis.analysis(basis.order());
+        let tests = cell.shape.test_points();
+        let fitted = analysis.points.len();
+        let count = fitted + tests.len();
+        let values = sample(&mut view, &mut analysis.points.iter().chain(&tests).copied(), count);
+        let mut missed = vec![Rgb::BLACK; tests.len()];
+        let mut functions = [0.0; 36];
+        for (g, values) in values.chunks(count).enumerate() {
+            let values: Vec<f64> = values.iter().map(|v| v[0]).collect();
+            let own = analysis.coefficients(&values[..fitted]);
+            for ((x, value), missed) in tests.iter().zip(&values[fitted..]).zip(&mut missed) {
+                basis.eval(*x, &mut functions);
+                let predicted: f64 = own.iter().zip(&functions).map(|(c, f)| c * f).sum();
+                *missed += exitance(g) * (value - predicted);
+            }
+            coefficients.extend(own);
+        }
+        let misfit = missed.iter().map(|m| Rgb(m.0.map(f64::abs)).sum()).sum::<f64>() / tests.len() as f64;
+        return Fit { coefficients, misfit, scatter: 0.0, lit: 1.0 };
+    }
+    let count = grid.points.len();
+    let values = sample(&mut view, &mut grid.points.iter().copied(), count);
+    // where no lamp shines it may be dark inside of something
+    let dark = |q: usize| (0..groups).all(|g| values[g * count + q] == [0.0; 2]) && is_buried(grid.points[q]);
+    let lit: Vec<bool> = (0..count).map(|q| !dark(q)).collect();
+    let alive = lit.iter().filter(|l| **l).count();
+    let part = if alive == count { None } else { Some(grid.part(&lit, n)) };
+    let matrix = part.as_ref().unwrap_or(&grid.matrix);
+    let mut left = vec![[Rgb::BLACK; 2]; count];
+    let mut noise = vec![Rgb::BLACK; count];
+    for (g, values) in values.chunks(count).enumerate() {
+        let own: Vec<[f64; 2]> = matrix
+            .chunks(count)
+            .map(|row| row.iter().zip(values).fold([0.0; 2], |sum, (m, v)| [sum[0] + m * v[0], sum[1] + m * v[1]]))
+            .collect();
+        for (q, (row, value)) in grid.values.chunks(n).zip(values).enumerate().filter(|(q, _)| lit[*q]) {
+            for h in 0..2 {
+                let fitted: f64 = row.iter().zip(&own).map(|(r, c)| r * c[h]).sum();
+                left[q][h] += exitance(g) * (value[h] - fitted);
+            }
+            noise[q] += exitance(g) * (0.5 * (value[0] - value[1]));
+        }
+        coefficients.extend(own.iter().map(|c| 0.5 * (c[0] + c[1])));
+    }
+    let share = alive as f64 / count as f64;
+    let freedom = alive.saturating_sub(n).max(1) as f64;
+    let count = alive.max(1);
+    let noise = (noise.iter().map(|e| Rgb(e.0.map(f64::abs)).sum().powi(2)).sum::<f64>() / count as f64).sqrt();
+    if noise == 0.0 {
+        // n functions took n degrees of freedom
+        let missed: f64 = left.iter().map(|l| Rgb(l[0].0.map(f64::abs)).sum()).sum();
+        return Fit { coefficients, misfit: missed / (count as f64 * freedom).sqrt(), scatter: 0.0, lit: share };
+    }
+    let square: f64 = left.iter().map(|[a, b]| a.sum() * b.sum()).sum::<f64>() / freedom;
+    let certain = square > SIGNIFICANT * 2.0 * noise * noise / freedom.sqrt();
+    let misfit = if certain { MEAN_OF_ROOT * square.sqrt() } else { 0.0 };
+    Fit { coefficients, misfit, scatter: noise * (n as f64 / count as f64).sqrt(), lit: share }
+}
+
+/// Mean absolute value of a misfit, over its root mean square, about.
+const MEAN_OF_ROOT: f64 = 0.7;

@@ -1,0 +1,487 @@
+//! Indirect light: what arrives at points of an element, by rays that ask where the light comes from.
+//!
+//! A row of the transport operator is the mean, over directions weighted by the cosine, of the radiosity met. Its
+//! samples are drawn once; the light they read is linear in the solution, so the samples *are* the row. An element's
+//! functions are fitted to its points by least squares; a constant field comes out exactly constant. Every point has
+//! two independent halves of samples, which say how large their scatter is, and whether what the fit leaves over at the
+//! points is scatter or shape.
+
+use super::lamps::on_cell;
+use crate::kernel::LightKernel;
+use ondelette_compress::{Forest, NodeId};
+use ondelette_numerics::{seed, sobol};
+use ondelette_wavelet::cell::{CellBasis, CellShape};
+use std::ops::Range;
+
+/// Most functions of a basis.
+pub(super) const MOST: usize = 36;
+/// Most points of an element.
+const MOST_POINTS: usize = 64;
+/// The leaf of a ray that meets nothing, and of one that meets a black back.
+const NOWHERE: u32 = u32::MAX;
+const BACK: u32 = u32::MAX - 1;
+/// Directions of a point and half that iterations use; the last sweep uses all.
+pub(super) const FIRST: u32 = 8;
+
+/// One sample of a row: where on a leaf it arrives.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Ray {
+    /// Leaf coordinates of its end.
+    pub(super) to: [f32; 2],
+    /// The leaf met, or [`NOWHERE`], or [`BACK`].
+    pub(super) leaf: u32,
+    /// Index of the point that it starts from.
+    pub(super) point: u32,
+}
+
+/// A point that gathers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Point {
+    /// Element coordinates.
+    at: [f64; 2],
+    key: u64,
+}
+
+/// An element that gathers.
+#[derive(Clone, Debug)]
+pub(super) struct Gather {
+    /// Its node.
+    pub(super) node: NodeId,
+    /// Where it gathers.
+    points: Vec<Point>,
+    /// Which of them are not inside of something.
+    lit: Vec<bool>,
+    /// Directions drawn at every point, in each half.
+    pub(super) drawn: u32,
+    /// The first samples of each half, and the others.
+    first: [Vec<Ray>; 2],
+    others: [Vec<Ray>; 2],
+    /// Order of the functions in use.
+    pub(super) order: usize,
+    /// Values at the points to coefficients of the functions in use, `[function][point]`.
+    fit: Vec<f64>,
+}
+
+/// Directions to draw for some points of a gather.
+#[derive(Clone, Debug)]
+pub(super) struct Draw {
+    pub(super) gather: u32,
+    pub(super) points: Range<u32>,
+    pub(super) directions: Range<u32>,
+}
+
+impl Draw {
+    /// Rays of both halves.
+    pub(super) fn rays(&self) -> usize {
+        2 * self.points.len() * self.directions.len()
+    }
+}
+
+impl Gather {
+    /// At a point in each of 16 (or, if not `fine`, 4) equal parts, without samples.
+    pub(super) fn new(forest: &Forest, node: NodeId, fine: bool) -> Self {
+        let cell = forest.node(node).cell;
+        let shape = cell.shape;
+        let points = strata(shape, if fine { 2 } else { 1 }, seed::combine(cell.key, 0x6761_7468));
+        Gather {
+            node,
+            points,
+            lit: Vec::new(),
+            drawn: 0,
+            first: Default::default(),
+            others: Default::default(),
+            order: 1,
+            fit: Vec::new(),
+        }
+    }
+
+    /// Points.
+    pub(super) fn points(&self) -> u32 {
+        self.points.len() as u32
+    }
+
+    /// Directions from none to `directions` at every point.
+    pub(super) fn all(gather: usize, points: u32, directions: Range<u32>) -> Draw {
+        Draw { gather: gather as u32, points: 0..points, directions }
+    }
+
+    /// Takes drawn samples.
+    pub(super) fn take(&mut self, draw: &Draw, rays: [Vec<Ray>; 2]) {
+        let early = (FIRST.saturating_sub(draw.directions.start) as usize).min(draw.directions.len());
+        for (h, rays) in rays.into_iter().enumerate() {
+            for ray in rays.chunks(draw.directions.len()) {
+                self.first[h].extend_from_slice(&ray[..early]);
+                self.others[h].extend_from_slice(&ray[early..]);
+            }
+        }
+        self.drawn = self.drawn.max(draw.directions.end);
+    }
+
+    /// Chooses the functions to fit: at most what the points determine.
+    pub(super) fn prepare(&mut self, basis: &CellBasis, most: usize) {
+        // points that see only backs are inside of something: dark, and no part of the fit
+        self.lit = vec![false; self.points.len()];
+        for ray in self.first.iter().chain(&self.others).flatten() {
+            self.lit[ray.point as usize] |= ray.leaf != BACK;
+        }
+        let points = self.lit.iter().filter(|l| **l).count();
+        if points == 0 {
+            self.order = 1;
+            self.fit = vec![0.0; self.points.len()];
+            return;
+        }
+        self.order = if basis.is_nested() {
+            (1..=most.min(basis.order())).rev().find(|&p| basis.truncated(p).len() <= points).unwrap_or(1)
+        } else {
+            basis.order()
+        };
+        let index = basis.truncated(self.order);
+        let n = index.len();
+        let mut values = vec![0.0; self.points.len() * n];
+        let mut all = [0.0; MOST];
+        for ((point, lit), row) in self.points.iter().zip(&self.lit).zip(values.chunks_mut(n)) {
+            if *lit {
+                basis.eval(point.at, &mut all);
+                row.iter_mut().zip(index).for_each(|(v, &i)| *v = all[usize::from(i)]);
+            }
+        }
+        // about the mean: (G + e) d = b - G m, so that constants are exact however few the points
+        let share = 1.0 / points as f64;
+        let mut gram = vec![0.0; n * n];
+        for row in values.chunks(n) {
+            for i in 0..n {
+                for j in 0..n {
+                    gram[i * n + j] += share * row[i] * row[j];
+                }
+            }
+        }
+        let one = |i: usize| if !basis.is_nested() || i == 0 { 1.0 } else { 0.0 };
+        let constant: Vec<f64> = (0..n).map(|i| (0..n).map(|j| gram[i * n + j] * one(j)).sum()).collect();
+        (0..n).for_each(|i| gram[i * n + i] += 1e-4);
+        let inverse = inverse(gram, n);
+        self.fit.clear();
+        for i in 0..n {
+            let row = &inverse[i * n..(i + 1) * n];
+            let rest = one(i) - row.iter().zip(&constant).map(|(a, b)| a * b).sum::<f64>();
+            for (value, lit) in values.chunks(n).zip(&self.lit) {
+                let whole = row.iter().zip(value).map(|(a, b)| a * b).sum::<f64>() + rest;
+                self.fit.push(if *lit { share * whole } else { 0.0 });
+            }
+        }
+    }
+
+    /// Follows rays whose leaf was split since.
+    pub(super) fn relocate(&mut self, forest: &Forest) {
+        for rays in self.first.iter_mut().chain(&mut self.others) {
+            relocate(forest, rays);
+        }
+    }
+
+    /// Hands its points and samples to gathers of the children of its node; these get more points, too, for which
+    /// samples are still to be drawn: their first index is returned beside each child.
+    pub(super) fn split(&self, forest: &Forest) -> Vec<(Gather, u32)> {
+        let shape = forest.node(self.node).cell.shape;
+        let mut place = vec![(0, 0); self.points.len()];
+        let mut children: Vec<Gather> = (0..shape.arity())
+            .map(|c| {
+                let mut child = Gather::new(forest, forest.child(self.node, c), false);
+                child.points.clear();
+                child.drawn = self.drawn;
+                child
+            })
+            .collect();
+        for (point, place) in self.points.iter().zip(&mut place) {
+            let (c, at) = shape.descend(point.at);
+            *place = (c, children[c].points.len() as u32);
+            children[c].points.push(Point { at, ..*point });
+        }
+        for h in 0..2 {
+            for ray in &self.first[h] {
+                let (c, point) = place[ray.point as usize];
+                children[c].first[h].push(Ray { point, ..*ray });
+            }
+            for ray in &self.others[h] {
+                let (c, point) = place[ray.point as usize];
+                children[c].others[h].push(Ray { point, ..*ray });
+            }
+        }
+        children
+            .into_iter()
+            .map(|mut child| {
+                let known = child.points.len() as u32;
+                let key = seed::combine(forest.node(child.node).cell.key, 0x6578_7472);
+                child.points.extend(strata(shape, 1, key));
+                (child, known)
+            })
+            .collect()
+    }
+
+    /// Values at the points from one half of the samples.
+    fn values(&self, radiosity: &Field<'_>, half: usize, all: bool, out: &mut [[f64; 3]]) {
+        out.fill([0.0; 3]);
+        let mut add = |rays: &[Ray]| {
+            for ray in rays {
+                let b = radiosity.met(ray);
+                let sum = &mut out[ray.point as usize];
+                (0..3).for_each(|c| sum[c] += b[c]);
+            }
+        };
+        add(&self.first[half]);
+        let mut directions = self.drawn.min(FIRST);
+        if all {
+            add(&self.others[half]);
+            directions = self.drawn;
+        }
+        let share = 1.0 / f64::from(directions.max(1));
+        out.iter_mut().flatten().for_each(|v| *v *= share);
+    }
+
+    /// Coefficients that fit values at the points, added to `out` with a factor.
+    fn add_fit(&self, basis: &CellBasis, values: &[[f64; 3]], factor: f64, out: &mut [[f64; 3]]) {
+        let index = basis.truncated(self.order);
+        for (row, &i) in self.fit.chunks(values.len()).zip(index) {
+            let to = &mut out[usize::from(i)];
+            for (k, v) in row.iter().zip(values) {
+                (0..3).for_each(|c| to[c] += factor * k * v[c]);
+            }
+        }
+    }
+
+    /// What the first samples gather, as coefficients.
+    pub(super) fn gather(&self, radiosity: &Field<'_>, out: &mut [[f64; 3]]) {
+        let basis = radiosity.forest.basis_of(self.node);
+        let mut values = [[0.0; 3]; MOST_POINTS];
+        let values = &mut values[..self.points.len()];
+        for half in 0..2 {
+            self.values(radiosity, half, false, values);
+            self.add_fit(basis, values, 0.5, out);
+        }
+    }
+
+    /// What all samples gather, as coefficients, and what they say of themselves.
+    pub(super) fn judge(&self, radiosity: &Field<'_>, out: &mut [[f64; 3]]) -> Verdict {
+        let basis = radiosity.forest.basis_of(self.node);
+        let n = basis.len();
+        let points = self.points.len();
+        let mut values = [[[0.0; 3]; MOST_POINTS]; 2];
+        let mut fits = [[[0.0; 3]; MOST]; 2];
+        for half in 0..2 {
+            let own = &mut values[half][..points];
+            self.values(radiosity, half, true, own);
+            self.add_fit(basis, own, 1.0, &mut fits[half][..n]);
+        }
+        let mut square = [0.0; 3];
+        for i in 0..n {
+            for c in 0..3 {
+                out[i][c] = 0.5 * (fits[0][i][c] + fits[1][i][c]);
+                square[c] += (0.5 * (fits[0][i][c] - fits[1][i][c])).powi(2);
+            }
+        }
+        let scale = if basis.is_nested() { 1.0 } else { 1.0 / n as f64 };
+        let scatter = square.iter().map(|s| (s * scale).sqrt()).sum();
+        let mut noise = [0.0; 3];
+        let mut misfit = 0.0;
+        let mut functions = [0.0; MOST];
+        let points = self.lit.iter().filter(|l| **l).count();
+        for (p, point) in self.points.iter().enumerate().filter(|(p, _)| self.lit[*p]) {
+            basis.eval(point.at, &mut functions);
+            let mut product = 0.0;
+            for c in 0..3 {
+                noise[c] += (0.5 * (values[0][p][c] - values[1][p][c])).powi(2);
+                let left = |h: usize| {
+                    let fitted: f64 = fits[h][..n].iter().zip(&functions).map(|(f, v)| f[c] * v).sum();
+                    values[h][p][c] - fitted
+                };
+                let both = left(0) * left(1);
+                // roots of channels are added: their errors go together
+                product += both.signum() * both.abs().sqrt();
+            }
+            misfit += product * product.abs();
+        }
+        let used = basis.truncated(self.order).len();
+        // the fit took its share of the degrees of freedom
+        let left = points.saturating_sub(used);
+        misfit = if left > 0 { misfit / left as f64 } else { 0.0 };
+        let noise: f64 = noise.iter().map(|s| (s / points.max(1) as f64).sqrt()).sum();
+        // the product of two scattered numbers, the mean of `left` of them
+        let certainty = 2.0 * noise * noise / (left.max(1) as f64).sqrt();
+        Verdict { scatter, noise, misfit, certainty, share: (used as f64 / points.max(1) as f64).sqrt() }
+    }
+}
+
+/// What the samples of an element say of themselves.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Verdict {
+    /// Root mean square over the element of half the difference of the halves' fits, channels summed: the scatter of
+    /// their mean.
+    pub(super) scatter: f64,
+    /// The same at the points, before the fit.
+    pub(super) noise: f64,
+    /// Mean product of what both halves' fits leave over at the points: on average the square of what the functions
+    /// cannot say.
+    pub(super) misfit: f64,
+    /// Standard deviation of [`Verdict::misfit`].
+    pub(super) certainty: f64,
+    /// Scatter of the fit over noise at the points, as expected.
+    pub(super) share: f64,
+}
+
+/// A point at random in each of the parts that `levels` splits of a cell make: a mean over them has no bias.
+fn strata(shape: CellShape, levels: u32, key: u64) -> Vec<Point> {
+    let parts = shape.arity().pow(levels);
+    let place = |k: usize| {
+        let key = seed::combine(key, k as u64);
+        let mut at = on_cell(shape, [seed::unit(seed::combine(key, 1)), seed::unit(seed::combine(key, 2))]);
+        let mut path = k;
+        for _ in 0..levels {
+            let (o, sign) = shape.child(path % shape.arity());
+            path /= shape.arity();
+            at = [o[0] + 0.5 * sign * at[0], o[1] + 0.5 * sign * at[1]];
+        }
+        Point { at, key }
+    };
+    (0..parts).map(place).collect()
+}
+
+/// Draws samples for both halves.
+pub(super) fn cast(kernel: &LightKernel, forest: &Forest, gather: &Gather, draw: &Draw) -> [Vec<Ray>; 2] {
+    let cell = forest.node(gather.node).cell;
+    let side = cell.root as usize;
+    let element = kernel.element(&cell);
+    let covers = kernel.has_covers(side);
+    [0u64, 1].map(|half| {
+        let mut rays = Vec::with_capacity(draw.rays() / 2);
+        for p in draw.points.clone() {
+            let point = &gather.points[p as usize];
+            let x = element.point(point.at);
+            let covered = covers && kernel.is_covered(side, x);
+            let key = seed::combine(point.key, half);
+            for index in draw.directions.clone() {
+                let nowhere = Ray { to: [0.0; 2], leaf: NOWHERE, point: p };
+                if covered {
+                    rays.push(nowhere);
+                    continue;
+                }
+                let [u, v, ..] = sobol::point(key, index);
+                let Some(hit) = kernel.first_hit_from(side, x, kernel.direction(side, [u, v])) else {
+                    rays.push(nowhere);
+                    continue;
+                };
+                rays.push(match kernel.side_of(hit.patch, !hit.front) {
+                    None => Ray { leaf: BACK, ..nowhere },
+                    Some(met) => {
+                        let at = if hit.front { hit.at } else { [hit.at[1], hit.at[0]] };
+                        let (leaf, to) = forest.locate(met, at);
+                        Ray { to: to.map(|x| x as f32), leaf: leaf.0, ..nowhere }
+                    }
+                });
+            }
+        }
+        rays
+    })
+}
+
+/// Follows rays whose leaf was split since.
+fn relocate(forest: &Forest, rays: &mut [Ray]) {
+    for ray in rays {
+        if ray.leaf >= BACK {
+            continue;
+        }
+        let mut id = NodeId(ray.leaf);
+        let mut x = ray.to.map(f64::from);
+        while !forest.is_leaf(id) {
+            let (c, local) = forest.node(id).cell.shape.descend(x);
+            (id, x) = (forest.child(id, c), local);
+        }
+        if id.0 != ray.leaf {
+            (ray.leaf, ray.to) = (id.0, x.map(|x| x as f32));
+        }
+    }
+}
+
+/// Inverse of a symmetric positive definite matrix, by Gauss and Jordan.
+pub(super) fn inverse(mut a: Vec<f64>, n: usize) -> Vec<f64> {
+    let mut b = vec![0.0; n * n];
+    (0..n).for_each(|i| b[i * n + i] = 1.0);
+    for k in 0..n {
+        let pivot = 1.0 / a[k * n + k];
+        for j in 0..n {
+            a[k * n + j] *= pivot;
+            b[k * n + j] *= pivot;
+        }
+        for i in 0..n {
+            let factor = a[i * n + k];
+            if i != k && factor != 0.0 {
+                for j in 0..n {
+                    a[i * n + j] -= factor * a[k * n + j];
+                    b[i * n + j] -= factor * b[k * n + j];
+                }
+            }
+        }
+    }
+    b
+}
+
+/// A radiosity at the leaves, in the form in which rays read it fastest.
+pub(super) struct Field<'a> {
+    forest: &'a Forest,
+    coefficients: &'a [[f64; 3]],
+    /// For bases up to the second order: `a + b s + c t + d s t` on each leaf.
+    bilinear: Vec<[[f64; 3]; 4]>,
+}
+
+impl<'a> Field<'a> {
+    /// Prepares coefficients at the leaves. Cost linear in the nodes.
+    pub(super) fn new(forest: &'a Forest, coefficients: &'a [[f64; 3]]) -> Self {
+        let bases = [CellShape::Square, CellShape::Triangle].map(|shape| forest.basis(shape));
+        let mut bilinear = Vec::new();
+        if bases.iter().all(|b| b.is_nested() && b.order() <= 2) {
+            // each function by its values at three or four corners
+            let forms = bases.map(|basis| {
+                let at = |x: [f64; 2]| {
+                    let mut values = [0.0; MOST];
+                    basis.eval(x, &mut values);
+                    values
+                };
+                let [o, s, t, st] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]].map(at);
+                let square = if basis.shape() == CellShape::Square { 1.0 } else { 0.0 };
+                let form = |i: usize| [o[i], s[i] - o[i], t[i] - o[i], square * (st[i] - s[i] - t[i] + o[i])];
+                (0..basis.len()).map(form).collect::<Vec<[f64; 4]>>()
+            });
+            let stride = forest.stride();
+            bilinear = vec![[[0.0; 3]; 4]; forest.len()];
+            for (n, (node, out)) in forest.nodes().iter().zip(&mut bilinear).enumerate() {
+                if node.first_child == 0 {
+                    let forms = &forms[usize::from(node.cell.shape == CellShape::Triangle)];
+                    for (form, c) in forms.iter().zip(&coefficients[n * stride..]) {
+                        for (o, f) in out.iter_mut().zip(form) {
+                            (0..3).for_each(|k| o[k] += f * c[k]);
+                        }
+                    }
+                }
+            }
+        }
+        Field { forest, coefficients, bilinear }
+    }
+
+    /// What a ray meets.
+    fn met(&self, ray: &Ray) -> [f64; 3] {
+        if ray.leaf >= BACK {
+            return [0.0; 3];
+        }
+        let [s, t] = ray.to.map(f64::from);
+        if let Some([a, b, c, d]) = self.bilinear.get(ray.leaf as usize) {
+            let st = s * t;
+            return std::array::from_fn(|k| a[k] + b[k] * s + c[k] * t + d[k] * st);
+        }
+        let basis = self.forest.basis(self.forest.node(NodeId(ray.leaf)).cell.shape);
+        let mut values = [0.0; MOST];
+        basis.eval([s, t], &mut values);
+        let own = &self.coefficients[ray.leaf as usize * self.forest.stride()..][..basis.len()];
+        let mut sum = [0.0; 3];
+        for (c, v) in own.iter().zip(&values) {
+            (0..3).for_each(|k| sum[k] += c[k] * v);
+        }
+        sum
+    }
+}

@@ -1,0 +1,277 @@
+//! The emitters as a receiver sees them: which of them matter to an element, what may stand between, and what they
+//! bring to a point.
+
+use crate::form_factor::{Polygon, point_to_polygon};
+use crate::kernel::{Element, LightKernel, density};
+use crate::occluder::Shaft;
+use crate::rgb::Rgb;
+use crate::scene::Scene;
+use crate::visible::View;
+use glam::DVec3;
+use ondelette_compress::Cell;
+use ondelette_numerics::{seed, sobol};
+use ondelette_wavelet::cell::CellShape;
+
+/// Emitters up to which each is a lamp of its own; fainter ones are met by rays.
+pub(super) const MOST_LAMPS: usize = 4096;
+/// Blockers up to which the visible part of a lamp is cut out exactly; beyond, rays decide.
+const MOST_BLOCKERS: usize = 24;
+/// Blockers that are always cheap enough to cut out.
+const FEW_BLOCKERS: usize = 4;
+/// Share of a lamp below which its visible part counts as a crack.
+const SLIVER: f64 = 2e-6;
+/// Share of an element's light from which a lamp is worth a look at what stands before it.
+const WORTHY: f64 = 0.04;
+
+/// One emitting side.
+#[derive(Clone, Debug)]
+pub(super) struct Lamp {
+    /// Its side.
+    pub(super) side: usize,
+    patch: u32,
+    /// Index into [`Lamps::groups`].
+    group: usize,
+    /// Exitance, channels summed.
+    power: f64,
+    element: Element,
+    polygon: Polygon,
+    centre: DVec3,
+    radius: f64,
+}
+
+/// All lamps, strongest first, in groups that share a material.
+#[derive(Clone, Debug)]
+pub(super) struct Lamps {
+    lamps: Vec<Lamp>,
+    /// Exitance of each group, and its material.
+    pub(super) groups: Vec<(u32, Rgb)>,
+    /// Whether a side is a lamp (else its emission is met by rays).
+    is_lamp: Vec<bool>,
+}
+
+/// What stands between an element and a lamp.
+#[derive(Clone, Debug)]
+enum Between {
+    /// Nothing.
+    Nothing,
+    /// These patches may.
+    Patches(Vec<u32>),
+    /// Too many to name: rays decide, so many a point on average.
+    Many(f64),
+}
+
+/// One lamp as an element sees it.
+#[derive(Clone, Debug)]
+pub(super) struct Sight {
+    lamp: u32,
+    between: Between,
+}
+
+impl Sight {
+    /// Whether something may stand in the way.
+    pub(super) fn is_masked(&self) -> bool {
+        !matches!(self.between, Between::Nothing)
+    }
+}
+
+impl Lamps {
+    /// The emitters of a scene.
+    pub(super) fn of(scene: &Scene, kernel: &LightKernel) -> Self {
+        let mut groups: Vec<(u32, Rgb)> = Vec::new();
+        let mut lamps = Vec::new();
+        for (side, frame) in scene.sides.iter().enumerate() {
+            let material = scene.patches[frame.patch as usize].material;
+            let exitance = scene.materials[material as usize].radiance * std::f64::consts::PI;
+            if exitance.sum() <= 0.0 {
+                continue;
+            }
+            let known = groups.iter().position(|g| g.0 == material);
+            let group = known.unwrap_or_else(|| {
+                groups.push((material, exitance));
+                groups.len() - 1
+            });
+            let shape = kernel.sides()[side].shape;
+            let element = kernel.element(&Cell::root(side as u32, shape));
+            let (centre, radius) = element.ball();
+            let polygon = element.polygon();
+            lamps.push(Lamp {
+                side,
+                patch: frame.patch,
+                group,
+                power: exitance.sum(),
+                element,
+                polygon,
+                centre,
+                radius,
+            });
+        }
+        let strength = |l: &Lamp| l.power * l.element.area();
+        lamps.sort_by(|a, b| strength(b).total_cmp(&strength(a)).then(a.side.cmp(&b.side)));
+        lamps.truncate(MOST_LAMPS);
+        let mut is_lamp = vec![false; scene.sides.len()];
+        lamps.iter().for_each(|l| is_lamp[l.side] = true);
+        Lamps { lamps, groups, is_lamp }
+    }
+
+    /// Number of lamps.
+    pub(super) fn len(&self) -> usize {
+        self.lamps.len()
+    }
+
+    /// Whether every receiver counts this side's emission as that of a lamp.
+    pub(super) fn is_lamp(&self, side: usize) -> bool {
+        self.is_lamp[side]
+    }
+
+    /// The lamps that an element may see, and what may stand between; `rays` go from a point to those behind many
+    /// things.
+    pub(super) fn seen_by(&self, kernel: &LightKernel, cell: &Cell, rays: f64) -> Vec<Sight> {
+        let element = kernel.element(cell);
+        let polygon = element.polygon();
+        let (centre, radius) = element.ball();
+        let tolerance = kernel.occluders().tolerance();
+        let own = kernel.sides()[cell.root as usize].patch;
+        let (n, mut whole) = (element.normal(), 0.0);
+        let mut facing = Vec::new();
+        for (k, lamp) in self.lamps.iter().enumerate() {
+            if lamp.side == cell.root as usize {
+                continue;
+            }
+            let m = lamp.element.normal();
+            let apart = lamp.centre - centre;
+            if n.dot(apart) < -lamp.radius || m.dot(apart) > radius {
+                continue;
+            }
+            let above =
+                |n: DVec3, o: DVec3, polygon: &Polygon| polygon.corners().iter().any(|c| n.dot(*c - o) > tolerance);
+            if !above(n, polygon.corners()[0], &lamp.polygon) || !above(m, lamp.polygon.corners()[0], &polygon) {
+                continue;
+            }
+            // about what it may bring, with the cosines that the element's extent allows
+            let distance = apart.length();
+            let slack = radius + lamp.radius;
+            let cosine = |c: f64| ((c + slack) / (distance + slack)).min(1.0);
+            let [a, b] = [cosine(n.dot(apart)), cosine(-m.dot(apart))];
+            let far = (distance - radius).max(0.0);
+            let area = lamp.element.area();
+            let potential = lamp.power * a * b * area / (std::f64::consts::PI * far * far + area);
+            whole += potential;
+            facing.push((k, potential));
+        }
+        let mut seen = Vec::new();
+        for (k, potential) in facing {
+            let share = potential / whole;
+            let lamp = &self.lamps[k];
+            let many = Between::Many(rays * share);
+            if share < WORTHY {
+                seen.push(Sight { lamp: k as u32, between: many });
+                continue;
+            }
+            let (a, b) = (polygon.corners(), lamp.polygon.corners());
+            let shaft = Shaft::between(a, n, b, lamp.element.normal(), tolerance);
+            let patches = kernel.occluders().candidates(&shaft, [own, lamp.patch]);
+            if patches.iter().any(|&p| kernel.occluders().hides(p, a, b)) {
+                continue;
+            }
+            let exact = patches.len() <= FEW_BLOCKERS || (patches.len() <= MOST_BLOCKERS && 4.0 * share > WORTHY);
+            let between = match patches.len() {
+                0 => Between::Nothing,
+                _ if exact => Between::Patches(patches),
+                _ => many,
+            };
+            seen.push(Sight { lamp: k as u32, between });
+        }
+        seen
+    }
+
+    /// Adds to `out[group]` the irradiance that the seen lamps bring to a point, for unit exitance: twice, once a half;
+    /// what rays decide is decided independently in each.
+    pub(super) fn irradiance(
+        &self,
+        kernel: &LightKernel,
+        view: &mut View,
+        seen: &[Sight],
+        at: (usize, DVec3, DVec3),
+        key: u64,
+        out: &mut [[f64; 2]],
+    ) {
+        let (side, x, n) = at;
+        let occluders = kernel.occluders();
+        for sight in seen {
+            let lamp = &self.lamps[sight.lamp as usize];
+            if lamp.element.normal().dot(x - lamp.centre) <= 0.0 {
+                continue;
+            }
+            let covers = kernel.covers_of(lamp.side);
+            let exact = match &sight.between {
+                Between::Nothing if covers.is_empty() => point_to_polygon(x, n, &lamp.polygon.clipped(x, n)),
+                Between::Many(rays) => {
+                    let mut whole = None;
+                    for (half, out) in out[lamp.group].iter_mut().enumerate() {
+                        // a whole number of rays, on average as many as planned; none for most of the faint lamps
+                        let key = seed::combine(seed::combine(key, half as u64), lamp.side as u64);
+                        let count = (0.5 * rays + seed::unit(key)).floor();
+                        if count == 0.0 {
+                            continue;
+                        }
+                        let whole = *whole.get_or_insert_with(|| point_to_polygon(x, n, &lamp.polygon.clipped(x, n)));
+                        if whole > 0.0 {
+                            let chance = (0.5 * rays).min(1.0);
+                            *out += whole * self.open_share(kernel, lamp, side, (x, n), (key, count as u32)) / chance;
+                        }
+                    }
+                    continue;
+                }
+                between => {
+                    if !view.aim(x, n, lamp.polygon.corners()) {
+                        continue;
+                    }
+                    for &cover in covers {
+                        view.cover(&kernel.sides()[cover as usize].corners());
+                    }
+                    if let Between::Patches(patches) = between {
+                        for &p in patches {
+                            view.block(occluders.corners(p));
+                        }
+                    }
+                    // what is left of a lamp behind a wall of pieces are the cracks between them
+                    let open = view.irradiance();
+                    if open > SLIVER * point_to_polygon(x, n, &lamp.polygon.clipped(x, n)) { open } else { 0.0 }
+                }
+            };
+            out[lamp.group].iter_mut().for_each(|out| *out += exact);
+        }
+    }
+
+    /// Visible share of a lamp from a point, weighted with the kernel, by rays.
+    fn open_share(
+        &self,
+        kernel: &LightKernel,
+        lamp: &Lamp,
+        side: usize,
+        at: (DVec3, DVec3),
+        (key, rays): (u64, u32),
+    ) -> f64 {
+        let (x, n) = at;
+        let patches = [kernel.sides()[side].patch, lamp.patch];
+        let (mut open, mut whole) = (0.0, 0.0);
+        for i in 0..rays {
+            let [s, t, ..] = sobol::point(key, i);
+            let y = on_cell(lamp.element.shape(), [s, t]);
+            let point = lamp.element.point(y);
+            let weight = density(x, n, point, lamp.element.normal());
+            if weight > 0.0 {
+                whole += weight;
+                if !kernel.is_covered(lamp.side, point) && !kernel.occluders().blocked(x, point, patches) {
+                    open += weight;
+                }
+            }
+        }
+        if whole > 0.0 { open / whole } else { 0.0 }
+    }
+}
+
+/// A point of the unit square, folded onto a cell's domain.
+pub(super) fn on_cell(shape: CellShape, y: [f64; 2]) -> [f64; 2] {
+    if shape == CellShape::Triangle && y[0] + y[1] > 1.0 { [1.0 - y[0], 1.0 - y[1]] } else { y }
+}

@@ -1,0 +1,433 @@
+//! The engine for scenes of any size: direct light exact, indirect light by sampled rows of the operator.
+//!
+//! E = D + I. **D**, what the lamps send, holds nearly all sharp edges: it is known exactly at any point (the visible
+//! part of a lamp is cut out of it) and fitted on an adaptive tree. **I**, everything that was reflected, is smooth: it
+//! is gathered on a coarser cut through the same trees, by rays that are drawn once and read the present solution
+//! wherever they arrive. No pair of surfaces is ever looked at, so n surfaces cost about n log n; no element of one
+//! part refines the other.
+//!
+//! [`lamps`] -> [`direct`] (D on an element), [`gather`] (a row of I) -> [`Sampled`] (the stepped solver) with [`plan`]
+//! (what to spend the next batch on).
+
+mod direct;
+mod gather;
+mod lamps;
+mod plan;
+
+use crate::kernel::LightKernel;
+use crate::rgb::Rgb;
+use crate::scene::Scene;
+use crate::settings::Settings;
+use crate::solution::{Solution, Statistics};
+use crate::solver::{Event, SolveError};
+use direct::Grid;
+use gather::{Draw, Field, Gather, Verdict};
+use lamps::Lamps;
+use ondelette_compress::{Forest, Links, NodeId, transport};
+use ondelette_numerics::krylov::Gmres;
+use ondelette_numerics::par;
+use ondelette_wavelet::cell::CellShape;
+use std::sync::Arc;
+
+/// Elements are at first no larger than this share of the scene's surface.
+const FIRST_SHARE: f64 = 1.0 / 256.0;
+/// Elements below this share of the scene's surface gather at few points.
+const SMALL_SHARE: f64 = 1.0 / 2048.0;
+/// Directions of a point and half in the first round.
+const FIRST_DIRECTIONS: u32 = 4;
+/// Samples cast in one step.
+const RAYS_A_STEP: usize = 16_384;
+/// Fewest rays of a point to all lamps together that it may see past many things.
+const LEAST_LAMP_RAYS: f32 = 8.0;
+/// Pairs of element and lamp fitted in one step.
+const FITS_A_STEP: usize = 1024;
+/// Krylov vectors kept before a restart.
+const RESTART: usize = 30;
+
+enum Phase {
+    /// Fitting direct light on new elements; then drawing samples, if there are any to draw.
+    Fitting {
+        nodes: Vec<NodeId>,
+        done: usize,
+        draws: Vec<Draw>,
+    },
+    /// Drawing samples.
+    Casting {
+        draws: Vec<Draw>,
+        done: usize,
+    },
+    /// Balancing.
+    Solving(Box<Gmres<3>>),
+    Finished,
+}
+
+/// The stepped solver.
+pub(crate) struct Sampled {
+    scene: Arc<Scene>,
+    settings: Settings,
+    kernel: LightKernel,
+    lamps: Lamps,
+    forest: Forest,
+    /// Of squares and of triangles.
+    grids: [Grid; 2],
+    /// Direct light for unit exitance: `[node][group][function]`.
+    direct: Vec<f64>,
+    /// Mean absolute misfit of the direct light of each leaf, channels summed.
+    misfit: Vec<f32>,
+    /// Scatter of the direct light of each leaf, where rays decide what is seen, and the rays a point.
+    scatter: Vec<f32>,
+    rays: Vec<f32>,
+    /// Share of each leaf that is not inside of something.
+    lit: Vec<f32>,
+    gathers: Vec<Gather>,
+    verdicts: Vec<Verdict>,
+    /// Indirect light: `[gather][function]`.
+    indirect: Vec<[f64; 3]>,
+    irradiance: Vec<[f64; 3]>,
+    phase: Phase,
+    counted_area: f64,
+    /// Integral of the irradiance over counted sides, channels summed; 0 before the first balance.
+    whole: f64,
+    /// What share of the promise batches aim at.
+    aim: f64,
+    rounds: u32,
+    /// Whether direct light changed since the last balance.
+    refitted: bool,
+    stalled: bool,
+    error: f64,
+    statistics: Statistics,
+}
+
+impl Sampled {
+    pub(crate) fn new(scene: Scene, settings: Settings) -> Result<Self, SolveError> {
+        let kernel = LightKernel::new(&scene);
+        let lamps = Lamps::of(&scene, &kernel);
+        let mut forest = Forest::new(settings.basis.family(), usize::from(settings.basis.order))
+            .expect("a parsed basis has a valid order");
+        let mut area = 0.0;
+        for side in kernel.sides() {
+            forest.add_root(side.shape, side.area);
+            area += side.area;
+        }
+        let counted = scene.sides.iter().zip(kernel.sides()).filter(|(s, _)| !scene.material(**s).is_pure_emitter());
+        let counted_area = counted.map(|(_, frame)| frame.area).sum();
+        let mut n = 0;
+        while n < forest.len() {
+            let id = NodeId(n as u32);
+            if forest.node(id).measure > FIRST_SHARE * area {
+                forest.split(id);
+            }
+            n += 1;
+        }
+        let leaves: Vec<NodeId> = (0..forest.len() as u32).map(NodeId).filter(|&id| forest.is_leaf(id)).collect();
+        let fine = |id: NodeId| forest.node(id).measure > SMALL_SHARE * area;
+        let gathers: Vec<Gather> = leaves.iter().map(|&id| Gather::new(&forest, id, fine(id))).collect();
+        let draw = |(k, gather): (usize, &Gather)| Gather::all(k, gather.points(), 0..FIRST_DIRECTIONS);
+        let draws = gathers.iter().enumerate().map(draw).collect();
+        let (nodes, stride) = (forest.len(), forest.stride());
+        Ok(Sampled {
+            direct: vec![0.0; nodes * stride * lamps.groups.len()],
+            misfit: vec![0.0; nodes],
+            scatter: vec![0.0; nodes],
+            lit: vec![1.0; nodes],
+            rays: vec![LEAST_LAMP_RAYS; nodes],
+            verdicts: vec![Verdict::default(); gathers.len()],
+            indirect: vec![[0.0; 3]; gathers.len() * stride],
+            irradiance: vec![[0.0; 3]; nodes * stride],
+            scene: Arc::new(scene),
+            settings,
+            kernel,
+            lamps,
+            grids: [CellShape::Square, CellShape::Triangle].map(|shape| Grid::of(forest.basis(shape))),
+            forest,
+            gathers,
+            phase: Phase::Fitting { nodes: leaves, done: 0, draws },
+            counted_area,
+            whole: 0.0,
+            aim: plan::AIM,
+            rounds: 0,
+            refitted: false,
+            stalled: false,
+            error: f64::INFINITY,
+            statistics: Statistics::default(),
+        })
+    }
+
+    pub(crate) fn scene(&self) -> &Arc<Scene> {
+        &self.scene
+    }
+
+    pub(crate) fn step(&mut self) -> Option<Event> {
+        match std::mem::replace(&mut self.phase, Phase::Finished) {
+            Phase::Fitting { nodes, done, draws } => Some(self.fit(nodes, done, draws)),
+            Phase::Casting { draws, done } => Some(self.cast(draws, done)),
+            Phase::Solving(gmres) => Some(self.sweep(gmres)),
+            Phase::Finished => None,
+        }
+    }
+
+    fn counts_now(&self) -> Statistics {
+        let mut statistics = self.statistics.clone();
+        statistics.estimated_error = self.error;
+        statistics.finished = matches!(self.phase, Phase::Finished) && !self.stalled;
+        statistics
+    }
+
+    pub(crate) fn solution(&self) -> Solution {
+        let (forest, irradiance) = (self.forest.clone(), self.irradiance.clone());
+        Solution::new(self.scene.clone(), self.settings, forest, Links::new(), irradiance, self.counts_now())
+            .with_lit(self.lit.clone())
+    }
+
+    pub(crate) fn into_solution(self) -> Solution {
+        let statistics = self.counts_now();
+        Solution::new(self.scene, self.settings, self.forest, Links::new(), self.irradiance, statistics)
+            .with_lit(self.lit)
+    }
+
+    /// Whether the promise counts a side: pure emitters receive too, but nobody asked how much.
+    fn counts(&self, side: u32) -> bool {
+        !self.scene.material(self.scene.sides[side as usize]).is_pure_emitter()
+    }
+
+    // ---- direct light
+
+    fn fit(&mut self, nodes: Vec<NodeId>, done: usize, draws: Vec<Draw>) -> Event {
+        let count = (FITS_A_STEP / self.lamps.len().clamp(1, FITS_A_STEP / 16)).min(nodes.len() - done);
+        let batch = &nodes[done..done + count];
+        let fits = par::map(count, |i| {
+            let cell = self.forest.node(batch[i]).cell;
+            let grid = &self.grids[usize::from(cell.shape == CellShape::Triangle)];
+            direct::fit(&self.kernel, &self.lamps, &self.forest, grid, &cell, f64::from(self.rays[batch[i].index()]))
+        });
+        let (groups, stride) = (self.lamps.groups.len(), self.forest.stride());
+        for (&id, fit) in batch.iter().zip(fits) {
+            let basis = self.forest.basis_of(id);
+            let n = basis.len();
+            let own = &mut self.direct[id.index() * groups * stride..(id.index() + 1) * groups * stride];
+            for g in 0..groups {
+                own[g * stride..g * stride + n].copy_from_slice(&fit.coefficients[g * n..(g + 1) * n]);
+            }
+            self.misfit[id.index()] = fit.misfit as f32;
+            self.scatter[id.index()] = fit.scatter as f32;
+            self.lit[id.index()] = fit.lit as f32;
+        }
+        self.statistics.kernel_samples += count as u64;
+        self.refitted = true;
+        let event = Event::Refining { done: done + count, total: nodes.len() };
+        if done + count < nodes.len() {
+            self.phase = Phase::Fitting { nodes, done: done + count, draws };
+        } else if draws.is_empty() {
+            self.spend();
+        } else {
+            self.phase = Phase::Casting { draws, done: 0 };
+        }
+        event
+    }
+
+    /// Splits leaves: children take over what is known, and are to be fitted.
+    fn split(&mut self, leaves: &[NodeId]) -> Vec<NodeId> {
+        let (groups, stride) = (self.lamps.groups.len(), self.forest.stride());
+        let mut fresh = Vec::new();
+        for &id in leaves {
+            self.forest.split(id);
+            let arity = self.forest.node(id).cell.shape.arity();
+            fresh.extend((0..arity).map(|c| self.forest.child(id, c)));
+            self.irradiance.resize(self.forest.len() * stride, [0.0; 3]);
+            transport::push_node(&self.forest, id, &mut self.irradiance);
+            self.irradiance[id.index() * stride..(id.index() + 1) * stride].fill([0.0; 3]);
+        }
+        self.direct.resize(self.forest.len() * groups * stride, 0.0);
+        self.misfit.resize(self.forest.len(), 0.0);
+        self.scatter.resize(self.forest.len(), 0.0);
+        self.lit.resize(self.forest.len(), 1.0);
+        // smaller elements need fewer rays
+        for &id in &fresh {
+            let parent = self.rays[self.forest.node(id).parent.index()];
+            self.rays.push((0.5 * parent).max(LEAST_LAMP_RAYS));
+        }
+        fresh
+    }
+
+    // ---- samples
+
+    fn cast(&mut self, draws: Vec<Draw>, done: usize) -> Event {
+        let mut count = 0;
+        let mut rays = 0;
+        while done + count < draws.len() && rays < RAYS_A_STEP {
+            rays += draws[done + count].rays();
+            count += 1;
+        }
+        let batch = &draws[done..done + count];
+        let made = par::map(count, |i| {
+            gather::cast(&self.kernel, &self.forest, &self.gathers[batch[i].gather as usize], &batch[i])
+        });
+        for (draw, rays) in batch.iter().zip(made) {
+            self.gathers[draw.gather as usize].take(draw, rays);
+        }
+        self.statistics.rays += rays as u64;
+        let event = Event::Gathering { done: done + count, total: draws.len() };
+        if done + count < draws.len() {
+            self.phase = Phase::Casting { draws, done: done + count };
+        } else {
+            self.prepare();
+            self.start_solving();
+        }
+        event
+    }
+
+    /// Brings samples up to date with the forest.
+    fn prepare(&mut self) {
+        let forest = &self.forest;
+        par::for_each_chunk(&mut self.gathers, 16, |_, gathers| {
+            for gather in gathers {
+                gather.relocate(forest);
+                gather.prepare(forest.basis_of(gather.node), usize::MAX);
+            }
+        });
+    }
+
+    // ---- balance
+
+    /// Direct light at the leaves.
+    fn direct_light(&self) -> Vec<[f64; 3]> {
+        let (groups, stride) = (self.lamps.groups.len(), self.forest.stride());
+        let mut values = vec![[0.0; 3]; self.forest.len() * stride];
+        for (n, node) in self.forest.nodes().iter().enumerate() {
+            if node.first_child == 0 {
+                for (g, (_, exitance)) in self.lamps.groups.iter().enumerate() {
+                    for j in 0..stride {
+                        let d = self.direct[(n * groups + g) * stride + j];
+                        (0..3).for_each(|c| values[n * stride + j][c] += exitance.0[c] * d);
+                    }
+                }
+            }
+        }
+        values
+    }
+
+    /// Adds gathered light, pushed to the leaves, to `values`.
+    fn add_indirect(&self, indirect: &[[f64; 3]], values: &mut [[f64; 3]]) {
+        let stride = self.forest.stride();
+        for (k, gather) in self.gathers.iter().enumerate() {
+            let own = &mut values[gather.node.index() * stride..(gather.node.index() + 1) * stride];
+            for (v, i) in own.iter_mut().zip(&indirect[k * stride..]) {
+                (0..3).for_each(|c| v[c] += i[c]);
+            }
+        }
+        transport::push(&self.forest, values);
+        for (n, node) in self.forest.nodes().iter().enumerate() {
+            if node.first_child != 0 {
+                values[n * stride..(n + 1) * stride].fill([0.0; 3]);
+            }
+        }
+    }
+
+    /// Irradiance at the leaves to what they send on, without what lamps send themselves.
+    fn reflect(&self, values: &mut [[f64; 3]], with_faint: bool) {
+        let stride = self.forest.stride();
+        for (n, node) in self.forest.nodes().iter().enumerate() {
+            if node.first_child != 0 {
+                continue;
+            }
+            let side = node.cell.root as usize;
+            let material = self.scene.material(self.scene.sides[side]);
+            for v in &mut values[n * stride..(n + 1) * stride] {
+                *v = (material.reflectance * Rgb(*v)).0;
+            }
+            if with_faint && material.radiance.sum() > 0.0 && !self.lamps.is_lamp(side) {
+                let basis = self.forest.basis(node.cell.shape);
+                let constant = if basis.is_nested() { 1 } else { basis.len() };
+                for v in &mut values[n * stride..n * stride + constant] {
+                    *v = (Rgb(*v) + material.radiance * std::f64::consts::PI).0;
+                }
+            }
+        }
+    }
+
+    /// What the gathers receive from a radiosity, by their first samples.
+    fn gather_short(&self, radiosity: &[[f64; 3]]) -> Vec<[f64; 3]> {
+        let field = Field::new(&self.forest, radiosity);
+        let stride = self.forest.stride();
+        let mut out = vec![[0.0; 3]; self.gathers.len() * stride];
+        par::for_each_chunk(&mut out, 16 * stride, |chunk, slots| {
+            for (k, own) in slots.chunks_mut(stride).enumerate() {
+                self.gathers[chunk * 16 + k].gather(&field, own);
+            }
+        });
+        out
+    }
+
+    fn start_solving(&mut self) {
+        let mut values = self.direct_light();
+        self.add_indirect(&self.indirect, &mut values);
+        self.reflect(&mut values, true);
+        let mut residual = self.gather_short(&values);
+        for (r, i) in residual.iter_mut().zip(&self.indirect) {
+            (0..3).for_each(|c| r[c] -= i[c]);
+        }
+        let stride = self.forest.stride();
+        let mut weights = vec![0.0; residual.len()];
+        for (k, gather) in self.gathers.iter().enumerate() {
+            let node = self.forest.node(gather.node);
+            let basis = self.forest.basis_of(gather.node);
+            if self.counts(node.cell.root) {
+                let share = if basis.is_nested() { node.measure } else { node.measure / basis.len() as f64 };
+                weights[k * stride..k * stride + basis.len()].fill(share);
+            }
+        }
+        self.statistics.iterations += 1;
+        self.phase = Phase::Solving(Box::new(Gmres::new(self.indirect.clone(), residual, weights)));
+    }
+
+    fn sweep(&mut self, mut gmres: Box<Gmres<3>>) -> Event {
+        let highest = self.scene.materials.iter().map(|m| m.reflectance.max()).fold(0.0, f64::max);
+        // no finer than the present error needs: it is refined anyway
+        let tolerance = self.settings.error.max(0.3 * self.error.min(0.3));
+        let wanted = 0.1 * tolerance * (1.0 - highest);
+        let whole = if self.whole > 0.0 { self.whole } else { self.integral(&self.direct_light()) };
+        let residual = |g: &Gmres<3>| {
+            let r = g.residual().iter().sum::<f64>() * self.counted_area.sqrt();
+            if whole > 0.0 { r / whole } else { 0.0 }
+        };
+        let now = residual(&gmres);
+        let direction = if now <= wanted { None } else { gmres.direction() };
+        let Some(direction) = direction else {
+            self.indirect = gmres.solution();
+            self.statistics.residual = now;
+            return self.judge(now / (1.0 - highest));
+        };
+        let mut values = vec![[0.0; 3]; self.forest.len() * self.forest.stride()];
+        self.add_indirect(direction, &mut values);
+        self.reflect(&mut values, false);
+        let mut product = self.gather_short(&values);
+        for (p, d) in product.iter_mut().zip(direction) {
+            (0..3).for_each(|c| p[c] = d[c] - p[c]);
+        }
+        gmres.supply(product);
+        self.statistics.iterations += 1;
+        let event = Event::Iterated { iterations: self.statistics.iterations, residual: residual(&gmres), wanted };
+        if gmres.steps() >= RESTART {
+            self.indirect = gmres.solution();
+            self.start_solving();
+        } else {
+            self.phase = Phase::Solving(gmres);
+        }
+        event
+    }
+
+    /// Integral over counted sides, channels summed, of coefficients at the leaves.
+    fn integral(&self, values: &[[f64; 3]]) -> f64 {
+        let stride = self.forest.stride();
+        let mut sum = 0.0;
+        for (n, node) in self.forest.nodes().iter().enumerate() {
+            if node.first_child == 0 && self.counts(node.cell.root) {
+                let basis = self.forest.basis(node.cell.shape);
+                let own = &values[n * stride..n * stride + basis.len()];
+                let mean = basis.mean(own, [0.0; 3], |a, b, k| (Rgb(a) + Rgb(b) * k).0);
+                sum += node.measure * f64::from(self.lit[n]) * mean.iter().sum::<f64>();
+            }
+        }
+        sum
+    }
+}

@@ -1,0 +1,348 @@
+//! What the error is, and what the next batch of work is spent on.
+//!
+//! Three errors are known apart: the misfit of direct light (measured at test points), the scatter of gathered light
+//! (half the difference of two independent halves), and what the functions of the gathering elements cannot say (the
+//! product of both halves' misses, which is free of scatter on average).
+
+use super::gather::{Draw, Field, Gather};
+use super::{Phase, Sampled};
+use crate::solver::Event;
+use ondelette_compress::NodeId;
+use ondelette_numerics::par;
+
+/// Share of the promise that is aimed at.
+pub(super) const AIM: f64 = 0.95;
+/// Shares of the aim for direct misfit, scatter, and the gathering elements' misfit: their squares add up to about 1.
+const SHARES: [f64; 3] = [0.40, 0.70, 0.55];
+/// Mean absolute value of a scattered number, over its standard deviation.
+const MEAN_OF_SCATTER: f64 = 0.8;
+/// Scatter falls with this power of the samples.
+const POWER: f64 = 0.7;
+/// Most directions of a point and half.
+const MOST_DIRECTIONS: f64 = 65_536.0;
+/// Most growth of an element's directions in a round.
+const GROWTH: f64 = 32.0;
+/// Mean absolute value of a misfit over its root mean square.
+const MEAN_OF_MISFIT: f64 = 0.8;
+/// A misfit below this share of what is allowed is not worth a split.
+const WORTHY: f64 = 1.0 / 400.0;
+/// Mean root of the positive part of a scattered number of mean 0, over the root of its standard deviation.
+const FLOOR: f64 = 0.4;
+/// A misfit larger than this many of its standard deviations is one.
+const SIGNIFICANT: f64 = 1.5;
+/// Factor of the rays of a point to the lamps where they scatter too much, and most of them.
+const MORE_LAMP_RAYS: f32 = 4.0;
+const MOST_LAMP_RAYS: f32 = 16_384.0;
+/// Deepest split.
+const DEEPEST: u32 = 16;
+/// Rounds after which every round aims lower, so that what is nearly good enough soon is.
+const PATIENT_ROUNDS: u32 = 3;
+/// Rounds after which nothing more is hoped for.
+const MOST_ROUNDS: u32 = 40;
+
+/// The errors, as integrals over counted sides, channels summed.
+#[derive(Clone, Copy, Debug, Default)]
+struct Errors {
+    direct: f64,
+    faint: f64,
+    scatter: f64,
+    misfit: f64,
+    together: f64,
+}
+
+impl Sampled {
+    /// Gathers with all samples, estimates the error, and plans what comes next.
+    pub(super) fn judge(&mut self, unsolved: f64) -> Event {
+        let stride = self.forest.stride();
+        let mut values = self.direct_light();
+        self.add_indirect(&self.indirect, &mut values);
+        self.reflect(&mut values, true);
+        let field = Field::new(&self.forest, &values);
+        let judged = par::map(self.gathers.len(), |k| {
+            let mut out = vec![[0.0; 3]; stride];
+            let verdict = self.gathers[k].judge(&field, &mut out);
+            (verdict, out)
+        });
+        for (k, (verdict, out)) in judged.into_iter().enumerate() {
+            self.verdicts[k] = verdict;
+            self.indirect[k * stride..(k + 1) * stride].copy_from_slice(&out);
+        }
+        self.statistics.iterations += 1;
+        let mut irradiance = self.direct_light();
+        self.add_indirect(&self.indirect, &mut irradiance);
+        self.irradiance = irradiance;
+        self.whole = self.integral(&self.irradiance);
+        let errors = self.errors();
+        self.error = if self.whole > 0.0 { errors.together / self.whole + unsolved } else { 0.0 };
+        self.rounds += 1;
+        self.refitted = false;
+        let event = Event::Solved { error: self.error, links: 0, elements: self.forest.leaves() };
+        if self.error <= self.settings.error {
+            self.phase = Phase::Finished;
+        } else if self.rounds >= MOST_ROUNDS {
+            self.stalled = true;
+            self.phase = Phase::Finished;
+        } else {
+            if self.rounds > PATIENT_ROUNDS {
+                self.aim *= 0.85;
+            }
+            self.spend();
+        }
+        event
+    }
+
+    fn errors(&self) -> Errors {
+        let mut errors = Errors::default();
+        let mut local = vec![0.0; self.forest.len()];
+        for (gather, verdict) in self.gathers.iter().zip(&self.verdicts) {
+            let node = self.forest.node(gather.node);
+            if self.counts(node.cell.root) {
+                let scatter = MEAN_OF_SCATTER * verdict.scatter;
+                local[gather.node.index()] = scatter;
+                errors.scatter += node.measure * scatter;
+            }
+        }
+        errors.misfit = self.misfit_of_gathers();
+        let mut together = 0.0;
+        for (n, node) in self.forest.nodes().iter().enumerate() {
+            if !self.counts(node.cell.root) {
+                continue;
+            }
+            if node.first_child != 0 {
+                for c in 0..node.cell.shape.arity() {
+                    local[node.first_child as usize + c] += local[n];
+                }
+            } else {
+                let direct = f64::from(self.misfit[n]);
+                let area = node.measure * f64::from(self.lit[n]);
+                errors.direct += area * direct;
+                let scatter = MEAN_OF_SCATTER * f64::from(self.scatter[n]);
+                errors.faint += area * scatter;
+                together += area * direct.hypot(local[n].hypot(scatter));
+            }
+        }
+        errors.together = together.hypot(errors.misfit);
+        errors
+    }
+
+    /// Integral of what the gathering elements' functions cannot say: roots of estimated squares, less what scatter
+    /// alone would make of them, and at least those that scatter would hardly make.
+    fn misfit_of_gathers(&self) -> f64 {
+        let (mut sum, mut sure) = (0.0, 0.0);
+        for (gather, verdict) in self.gathers.iter().zip(&self.verdicts) {
+            let node = self.forest.node(gather.node);
+            if self.counts(node.cell.root) {
+                let root = node.measure * verdict.misfit.max(0.0).sqrt();
+                sum += root - FLOOR * node.measure * verdict.certainty.sqrt();
+                if verdict.misfit > SIGNIFICANT * verdict.certainty {
+                    sure += root;
+                }
+            }
+        }
+        MEAN_OF_MISFIT * sure.max(sum)
+    }
+
+    /// Plans the next batch: direct light first, then the gathered.
+    pub(super) fn spend(&mut self) {
+        loop {
+            let aim = self.aim * self.settings.error * self.whole;
+            let leaves = self.worst_leaves(SHARES[0] * aim);
+            let unclear = self.unclear_leaves(SHARES[0] * aim, &leaves);
+            if !leaves.is_empty() || !unclear.is_empty() {
+                let mut nodes = self.split(&leaves);
+                nodes.extend(unclear);
+                self.phase = Phase::Fitting { nodes, done: 0, draws: Vec::new() };
+                return;
+            }
+            // children need direct light as well
+            let (nodes, mut draws) = self.split_gathers(SHARES[2] * aim);
+            draws.extend(self.draws(SHARES[1] * aim));
+            if !draws.is_empty() {
+                self.phase = Phase::Fitting { nodes, done: 0, draws };
+                return;
+            }
+            if self.refitted {
+                // see what it brought
+                self.phase = Phase::Casting { draws, done: 0 };
+                return;
+            }
+            // every part is within its share, and yet the sum is not
+            self.aim *= 0.8;
+            if self.aim < 0.05 {
+                self.stalled = true;
+                self.phase = Phase::Finished;
+                return;
+            }
+        }
+    }
+
+    /// The leaves whose direct light misses most, as many as bring the sum down to `target`.
+    fn worst_leaves(&self, target: f64) -> Vec<NodeId> {
+        let mut worst: Vec<(f64, u32)> = Vec::new();
+        let mut total = 0.0;
+        for (n, node) in self.forest.nodes().iter().enumerate() {
+            if node.first_child == 0 && self.counts(node.cell.root) {
+                let missed = node.measure * f64::from(self.lit[n] * self.misfit[n]);
+                total += missed;
+                if missed > 0.0 && node.cell.depth < DEEPEST {
+                    worst.push((missed, n as u32));
+                }
+            }
+        }
+        if total <= target {
+            return Vec::new();
+        }
+        worst.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let mut rest = (1.4 * (total - target)).min(0.7 * total);
+        let enough = worst.iter().take_while(|w| {
+            let more = rest > 0.0;
+            rest -= w.0;
+            more
+        });
+        let mut leaves: Vec<NodeId> = enough.map(|w| NodeId(w.1)).collect();
+        leaves.sort_unstable();
+        leaves
+    }
+
+    /// The leaves whose view of the lamps scatters most, as many as bring the sum down to `target` with more rays,
+    /// which they are given; not those that are split anyway.
+    fn unclear_leaves(&mut self, target: f64, split: &[NodeId]) -> Vec<NodeId> {
+        let mut worst: Vec<(f64, u32)> = Vec::new();
+        let mut total = 0.0;
+        for (n, node) in self.forest.nodes().iter().enumerate() {
+            if node.first_child == 0 && self.counts(node.cell.root) && self.scatter[n] > 0.0 {
+                let scatter = MEAN_OF_SCATTER * node.measure * f64::from(self.scatter[n]);
+                total += scatter;
+                if self.rays[n] < MOST_LAMP_RAYS && split.binary_search(&NodeId(n as u32)).is_err() {
+                    worst.push((scatter / f64::from(self.rays[n]), n as u32));
+                }
+            }
+        }
+        if total <= target {
+            return Vec::new();
+        }
+        worst.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let mut rest = 1.5 * (total - target);
+        let mut leaves = Vec::new();
+        for (scatter, n) in worst {
+            if rest <= 0.0 {
+                break;
+            }
+            rest -= scatter * f64::from(self.rays[n as usize]);
+            self.rays[n as usize] *= MORE_LAMP_RAYS;
+            leaves.push(NodeId(n));
+        }
+        leaves.sort_unstable();
+        leaves
+    }
+
+    /// Splits the gathering elements that their functions do not fit; returns new leaves to be fitted, and what is to
+    /// be drawn at new points.
+    fn split_gathers(&mut self, target: f64) -> (Vec<NodeId>, Vec<Draw>) {
+        let mut worst: Vec<(f64, usize)> = Vec::new();
+        let total = self.misfit_of_gathers();
+        for (k, (gather, verdict)) in self.gathers.iter().zip(&self.verdicts).enumerate() {
+            let node = self.forest.node(gather.node);
+            if self.counts(node.cell.root) {
+                let missed = node.measure * MEAN_OF_MISFIT * verdict.misfit.max(0.0).sqrt();
+                // what scatter alone may pretend is left alone
+                if verdict.misfit > SIGNIFICANT * verdict.certainty && node.cell.depth < DEEPEST {
+                    worst.push((missed, k));
+                }
+            }
+        }
+        if total <= target {
+            return Default::default();
+        }
+        worst.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let mut rest = 1.5 * (total - target);
+        let mut chosen: Vec<usize> = Vec::new();
+        for (missed, k) in worst {
+            if rest <= 0.0 || missed < WORTHY * target {
+                break;
+            }
+            rest -= missed;
+            chosen.push(k);
+        }
+        chosen.sort_unstable();
+        let leaves: Vec<NodeId> =
+            chosen.iter().map(|&k| self.gathers[k].node).filter(|&id| self.forest.is_leaf(id)).collect();
+        let fresh = self.split(&leaves);
+        let stride = self.forest.stride();
+        let mut gathers: Vec<Gather> = Vec::with_capacity(self.gathers.len() + 3 * chosen.len());
+        let mut indirect = Vec::with_capacity(self.indirect.len());
+        let mut verdicts = Vec::with_capacity(self.verdicts.len());
+        let mut draws = Vec::new();
+        let mut chosen = chosen.into_iter().peekable();
+        for (k, gather) in std::mem::take(&mut self.gathers).into_iter().enumerate() {
+            let own = &self.indirect[k * stride..(k + 1) * stride];
+            if chosen.next_if(|&c| c == k).is_none() {
+                gathers.push(gather);
+                indirect.extend_from_slice(own);
+                verdicts.push(self.verdicts[k]);
+                continue;
+            }
+            let basis = self.forest.basis_of(gather.node);
+            for (c, (child, known)) in gather.split(&self.forest).into_iter().enumerate() {
+                let mut values = vec![[0.0; 3]; stride];
+                let n = basis.len();
+                basis.push(c, &own[..n], &mut values[..n], |to: &mut [f64; 3], k, from: [f64; 3]| {
+                    (0..3).for_each(|c| to[c] += k * from[c]);
+                });
+                indirect.extend(values);
+                let points = known..child.points();
+                draws.push(Draw { gather: gathers.len() as u32, points, directions: 0..child.drawn });
+                gathers.push(child);
+                verdicts.push(self.verdicts[k]);
+            }
+        }
+        (self.gathers, self.indirect, self.verdicts) = (gathers, indirect, verdicts);
+        (fresh, draws)
+    }
+
+    /// The samples that bring the scatter down to `target`, where they do most.
+    fn draws(&self, target: f64) -> Vec<Draw> {
+        // the scatter of each element, predicted from the noise at its points (which is known better than the scatter
+        // itself), scaled so that the sum is the measured one
+        let (mut measured, mut predicted) = (0.0, 0.0);
+        let mut elements = Vec::with_capacity(self.gathers.len());
+        for (gather, verdict) in self.gathers.iter().zip(&self.verdicts) {
+            let node = self.forest.node(gather.node);
+            if !self.counts(node.cell.root) {
+                elements.push((0.0, 1.0, 1.0));
+                continue;
+            }
+            let weight = MEAN_OF_SCATTER * node.measure * verdict.noise * verdict.share;
+            predicted += weight;
+            measured += MEAN_OF_SCATTER * node.measure * verdict.scatter;
+            elements.push((weight, f64::from(gather.drawn.max(1)), f64::from(gather.points())));
+        }
+        if measured <= target || predicted <= 0.0 {
+            return Vec::new();
+        }
+        let ratio = measured / predicted;
+        let density_of =
+            |(weight, drawn, points): (f64, f64, f64)| (weight * drawn.powf(POWER) / points).powf(1.0 / (1.0 + POWER));
+        let density: Vec<f64> = elements.iter().map(|&e| density_of(e)).collect();
+        let wanted = |scale: f64, (e, density): (&(f64, f64, f64), &f64)| {
+            (scale * density).clamp(e.1, e.1 * GROWTH).min(MOST_DIRECTIONS.max(e.1))
+        };
+        let scatter = |scale: f64| -> f64 {
+            elements.iter().zip(&density).map(|e| ratio * e.0.0 * (wanted(scale, e) / e.0.1).powf(-POWER)).sum()
+        };
+        let largest = density.iter().copied().fold(0.0, f64::max);
+        let (mut low, mut high) = (1e-3 / largest, 1e12 / largest);
+        for _ in 0..32 {
+            let middle = (low * high).sqrt();
+            if scatter(middle) > target { low = middle } else { high = middle }
+        }
+        let mut draws = Vec::new();
+        for (k, (gather, element)) in self.gathers.iter().zip(elements.iter().zip(&density)).enumerate() {
+            let each = wanted(high, element).ceil() as u32;
+            if each > gather.drawn + gather.drawn / 4 {
+                draws.push(Gather::all(k, gather.points(), gather.drawn..each));
+            }
+        }
+        draws
+    }
+}

@@ -1,0 +1,163 @@
+//! The engine of sampled rows: exact where it must be, honest about its error, the same for any number of threads.
+
+use glam::DVec3;
+use ondelette_numerics::par;
+use ondelette_radiosity::ledger::Ledger;
+use ondelette_radiosity::probe::Prober;
+use ondelette_radiosity::scene::samples;
+use ondelette_radiosity::{Basis, Event, Method, Rgb, Scene, Settings, Solution, Solver};
+
+fn solve(scene: Scene, basis: &str, error: f64) -> Solution {
+    let basis: Basis = basis.parse().unwrap();
+    let mut solver = Solver::new(scene, Settings { basis, method: Method::Sampled, error }).unwrap();
+    while solver.step().is_some() {}
+    let solution = solver.into_solution();
+    assert!(solution.is_finished());
+    solution
+}
+
+const PLACES: [[f64; 2]; 6] = [[0.01, 0.01], [0.5, 0.5], [0.03, 0.7], [0.9, 0.99], [0.33, 0.25], [0.999, 0.001]];
+
+/// A box in a unit cube; `foot` is where it stands.
+fn room_with_box(foot: f64) -> Vec<([[f64; 3]; 4], Rgb, Rgb)> {
+    let p = |i: u32, o: [f64; 3], s: f64| [0, 1, 2].map(|k| o[k] + s * f64::from(i >> k & 1));
+    let walls = [[0, 1, 3, 2], [6, 7, 5, 4], [0, 2, 6, 4], [3, 1, 5, 7], [1, 0, 4, 5], [2, 3, 7, 6]];
+    let mut faces: Vec<_> =
+        walls.iter().map(|w| (w.map(|i| p(i, [0.0; 3], 1.0)), Rgb::grey(0.6), Rgb::BLACK)).collect();
+    let corner = [0.35, 0.3, foot];
+    faces.extend(
+        walls[1..].iter().map(|w| ([w[3], w[2], w[1], w[0]].map(|i| p(i, corner, 0.35)), Rgb::grey(0.6), Rgb::BLACK)),
+    );
+    let lamp = [[0.4, 0.4, 0.99], [0.4, 0.6, 0.99], [0.6, 0.6, 0.99], [0.6, 0.4, 0.99]];
+    faces.push((lamp, Rgb::BLACK, Rgb::grey(10.0)));
+    faces
+}
+
+#[test]
+fn a_white_furnace_is_equally_bright_everywhere() {
+    for basis in ["haar", "m2", "m3", "f2"] {
+        for rho in [0.5, 0.9] {
+            let solution = solve(samples::cube(rho, [1.0; 6]), basis, 0.01);
+            for side in 0..6 {
+                for at in PLACES {
+                    let error = solution.radiosity(side, at).0[1] * (1.0 - rho) - 1.0;
+                    assert!(error.abs() <= 2e-3, "{basis} rho {rho} side {side} {at:?}: off by {error:.2e}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn unequal_emission_in_a_closed_box_keeps_the_energy_identity() {
+    // integral of B = integral of M / (1 - rho), whatever M
+    for (basis, error) in [("haar", 0.05), ("m2", 0.01), ("m3", 0.01)] {
+        let rho = 0.7;
+        let solution = solve(samples::cube(rho, [3.0, 0.0, 0.5, 0.0, 0.0, 1.0]), basis, error);
+        let e: f64 = (0..6).map(|side| solution.mean_irradiance(side).0[0]).sum();
+        let expected = 4.5 / (1.0 - rho);
+        assert!((e / expected - 1.0).abs() < 0.5 * error, "{basis}: {e} instead of {expected}");
+    }
+}
+
+#[test]
+fn facing_squares_exchange_what_howell_c11_says() {
+    for basis in ["haar", "m2", "m3", "f2"] {
+        let solution = solve(samples::facing_squares(1.0), basis, 0.01);
+        let got = solution.mean_irradiance(0).0[0];
+        assert!((got / 0.199824895698387 - 1.0).abs() < 5e-3, "{basis}: {got}");
+    }
+}
+
+#[test]
+fn a_square_in_the_way_takes_what_the_clipped_closed_form_says() {
+    // parallel unit squares one apart, an opaque coaxial square half way: Howell B-3 clipped point by point
+    for (side, expected) in [(0.25, 0.169474204911786), (0.5, 0.0995062945989849)] {
+        let light = Rgb::grey(std::f64::consts::FRAC_1_PI);
+        let (a, b) = (0.5 - side / 2.0, 0.5 + side / 2.0);
+        let floor = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+        let lamp = [[0.0, 1.0, 1.0], [1.0, 1.0, 1.0], [1.0, 0.0, 1.0], [0.0, 0.0, 1.0]];
+        let block = [[a, a, 0.5], [b, a, 0.5], [b, b, 0.5], [a, b, 0.5]];
+        let faces = [(floor, Rgb::BLACK, Rgb::BLACK), (lamp, Rgb::BLACK, light), (block, Rgb::BLACK, Rgb::BLACK)];
+        let got = solve(samples::quads("blocked", &faces), "m2", 0.01).mean_irradiance(0).0[0];
+        assert!((got / expected - 1.0).abs() < 0.01, "{side}: {got} instead of {expected}");
+    }
+}
+
+#[test]
+fn the_error_is_kept_and_the_ledger_closes() {
+    let scene = samples::quads("box", &room_with_box(0.0));
+    let fine = solve(scene.clone(), "m2", 0.004);
+    let coarse = solve(scene, "m2", 0.02);
+    let (mut error, mut whole) = (0.0, 0.0);
+    let probers = [&coarse, &fine].map(Prober::new);
+    for side in 0..11 {
+        let area = if side < 6 { 1.0 } else { 0.35 * 0.35 };
+        for i in 0..400 {
+            let at = [(f64::from(i % 20) + 0.5) / 20.0, (f64::from(i / 20) + 0.5) / 20.0];
+            let [a, b] = [0, 1].map(|k: usize| probers[k].irradiance(side, at));
+            error += area * (a + b * -1.0).0[0].abs();
+            whole += area * b.0[0];
+        }
+    }
+    assert!(error / whole < 0.02, "error {}", error / whole);
+    assert!(fine.statistics().estimated_error <= 0.004);
+    for (solution, most) in [(&coarse, 0.01), (&fine, 0.003)] {
+        let closure = Ledger::count(solution, 1 << 18).closure();
+        assert!(closure.abs() < most, "ledger off by {closure}");
+    }
+}
+
+#[test]
+fn it_is_dark_under_a_box_and_bright_right_beside_it() {
+    let scene = samples::quads("box", &room_with_box(0.0));
+    let solution = solve(scene, "m2", 0.02);
+    let prober = Prober::new(&solution);
+    let under = |x: f64, y: f64| {
+        let (side, at) = prober.find(DVec3::new(x, y, 0.0), DVec3::Z).unwrap();
+        prober.irradiance(side, at).0[0]
+    };
+    let open = under(0.1, 0.1);
+    for [x, y] in [[0.36, 0.31], [0.5, 0.5], [0.69, 0.64], [0.355, 0.4]] {
+        assert_eq!(under(x, y), 0.0, "at {x}, {y}");
+    }
+    for [x, y] in [[0.34, 0.29], [0.71, 0.5], [0.345, 0.4]] {
+        assert!(under(x, y) > 0.05 * open, "at {x}, {y}: {} against {open}", under(x, y));
+    }
+}
+
+#[test]
+fn threads_change_nothing_and_every_state_is_valid() {
+    let run = |threads| {
+        par::with_threads(threads, || {
+            let scene = samples::quads("box", &room_with_box(0.1));
+            let mut solver = Solver::new(scene, Settings { error: 0.03, ..Settings::default() }).unwrap();
+            let mut states = Vec::new();
+            while let Some(event) = solver.step() {
+                if matches!(event, Event::Solved { .. } | Event::Refining { .. }) {
+                    let state = solver.solution();
+                    assert!(state.coefficients().as_flattened().iter().all(|c| c.is_finite()));
+                    states.push(state.mean_irradiance(0));
+                }
+            }
+            (states, solver.into_solution().coefficients().to_vec())
+        })
+        .unwrap()
+    };
+    let one = run(1);
+    assert!(one.0.len() > 3);
+    assert_eq!(one, run(3));
+}
+
+#[test]
+fn no_unit_of_length_is_better_than_another() {
+    let scaled = |k: f64| {
+        let mut faces = room_with_box(0.1);
+        faces.iter_mut().flat_map(|f| f.0.iter_mut()).flatten().for_each(|x| *x *= k);
+        solve(samples::quads("box", &faces), "m2", 0.05).mean_irradiance(0).0[0]
+    };
+    let one = scaled(1.0);
+    for k in [1e-3, 1e3] {
+        assert!((scaled(k) / one - 1.0).abs() < 1e-6, "scale {k}: {} against {one}", scaled(k));
+    }
+}
