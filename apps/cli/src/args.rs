@@ -13,6 +13,7 @@ use std::path::PathBuf;
   ondelette info room.glb                          what is in a scene
   ondelette light room.glb --error 1%              out/room.png, out/room.glb, out/room.json
   ondelette probe room.onl points.csv -o out.csv   irradiance and radiosity at points
+  ondelette verify room.onl                        an independent check of the promised error
 
 Exit codes: 0 done; 1 a valid result that is unfinished or misses its tolerance; 2 bad input or usage."
 )]
@@ -27,6 +28,8 @@ pub(crate) enum Command {
     Light(LightArgs),
     /// Irradiance and radiosity at points of a solved scene
     Probe(ProbeArgs),
+    /// Check a solution's promised error by independent random paths
+    Verify(crate::run::verify::VerifyArgs),
     /// What is in a scene file
     Info(InfoArgs),
     /// Transform arrays and pictures into a wavelet basis and back

@@ -32,6 +32,7 @@ fn dispatch(command: Command) -> Result<Outcome, Refusal> {
     match command {
         Command::Light(args) => run::light::run(plan::light::LightPlan::new(&args)?),
         Command::Probe(args) => run::probe::run(&args),
+        Command::Verify(args) => run::verify::run(&args),
         Command::Info(args) => run::info::run(&args),
         Command::Transform(args) => transform::run(&args).map(|()| Outcome::Done).map_err(Refusal::new),
     }

@@ -3,6 +3,7 @@
 pub(crate) mod info;
 pub(crate) mod light;
 pub(crate) mod probe;
+pub(crate) mod verify;
 
 use ondelette_io::ReadError;
 use ondelette_io::onl::OnlError;

@@ -6,3 +6,4 @@ mod program;
 mod refusals;
 #[cfg(unix)]
 mod stopping;
+mod verify;
