@@ -1,7 +1,8 @@
 //! Curves and surfaces: multiresolution editing and variational design of B-splines (thesis chapters 5 to 7).
 //!
 //! [`axis`] says where a spline lives: boundary, spans, domain; [`basis`] which functions are alive at a parameter.
-//! [`shape`]: curves and surfaces, what they mean as geometry; [`edit`]: handles on every level.
+//! [`shape`]: curves and surfaces, what they mean as geometry; [`edit`]: handles on every level; [`free`]: splines of
+//! other programs.
 //! [`energy`], [`constraint`]s and a [`system::Problem`] go to a [`solve::Solver`], which finds the smoothest shape.
 
 pub mod axis;
@@ -9,6 +10,7 @@ pub mod basis;
 pub mod constraint;
 pub mod edit;
 pub mod energy;
+pub mod free;
 pub mod shape;
 pub mod solve;
 pub mod system;
