@@ -1,12 +1,12 @@
 //! `ondelette transform`: wavelet transforms of arrays and pictures.
 
-mod npy;
 mod picture;
 mod plan;
 
 use std::path::{Path, PathBuf};
 
-use npy::{Grid, Values};
+use ondelette_io::npy::{self, Grid, Values};
+use ondelette_io::write::write_bytes;
 use ondelette_wavelet::{Coefficient, Decomposition, Kind, Sampling, Scalar};
 use plan::Plan;
 
@@ -77,11 +77,11 @@ pub(crate) fn run(args: &TransformArgs) -> Result<(), String> {
     if picture::is_picture(&args.output) {
         picture::write(&args.output, &output)?;
     } else {
-        npy::write_whole(&args.output, &npy::write(&output))?;
+        write_bytes(&args.output, &npy::write(&output)).map_err(|e| e.to_string())?;
     }
     if !args.inverse {
         let text = plan.sidecar(&output, kept);
-        npy::write_whole(&plan::sidecar_path(&args.output), text.as_bytes())?;
+        write_bytes(&plan::sidecar_path(&args.output), text.as_bytes()).map_err(|e| e.to_string())?;
     }
     Ok(())
 }

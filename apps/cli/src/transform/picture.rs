@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use super::npy::{Grid, Values, write_whole};
+use ondelette_io::npy::{Grid, Values};
+use ondelette_io::write::write_bytes;
 
 /// True for endings that are taken by channel.
 pub(crate) fn is_picture(path: &Path) -> bool {
@@ -94,5 +95,5 @@ pub(crate) fn write(path: &Path, grid: &Grid) -> Result<(), String> {
         );
         picture.write().to_buffered(&mut bytes).map_err(|e| failed(e.to_string()))?;
     }
-    write_whole(path, bytes.get_ref())
+    write_bytes(path, bytes.get_ref()).map_err(|e| e.to_string())
 }

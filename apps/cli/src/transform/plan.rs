@@ -6,8 +6,8 @@ use ondelette_wavelet::{Boundary, Family, Kind, Layout, Pyramid, Scaling, Tensor
 use serde_json::{Value, json};
 
 use super::TransformArgs;
-use super::npy::Grid;
 use super::picture::is_picture;
+use ondelette_io::npy::Grid;
 
 /// Version of the sidecar.
 const VERSION: u64 = 1;

@@ -1,23 +1,26 @@
-//! NumPy's `.npy` files of f32 and f64.
-
-use std::path::Path;
+//! NumPy's `.npy` files: f32 and f64 as they are, integers as f64.
 
 /// Values of a grid in one of the two types the transforms run in.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Values {
+pub enum Values {
+    /// Single precision.
     F32(Vec<f32>),
+    /// Double precision, and integers.
     F64(Vec<f64>),
 }
 
 /// A row-major grid.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Grid {
-    pub(crate) shape: Vec<usize>,
-    pub(crate) values: Values,
+pub struct Grid {
+    /// Length of each axis.
+    pub shape: Vec<usize>,
+    /// Values, the last axis running fastest.
+    pub values: Values,
 }
 
 impl Values {
-    pub(crate) fn name(&self) -> &'static str {
+    /// `f32` or `f64`.
+    pub fn name(&self) -> &'static str {
         match self {
             Values::F32(_) => "f32",
             Values::F64(_) => "f64",
@@ -39,8 +42,17 @@ fn entry<'a>(header: &'a str, key: &str) -> Result<&'a str, String> {
     rest.split([',', '}']).next().map(str::trim).ok_or_else(missing)
 }
 
-/// Parses a file.
-pub(crate) fn parse(bytes: &[u8]) -> Result<Grid, String> {
+/// Parses a file; its order (C or Fortran) and byte order may be any.
+///
+/// ```
+/// use ondelette_io::npy::{Grid, Values, parse, write};
+/// let grid = Grid { shape: vec![2, 1], values: Values::F64(vec![0.5, 2.0]) };
+/// assert_eq!(parse(&write(&grid)), Ok(grid));
+/// ```
+///
+/// # Errors
+/// A sentence: no such file, an element type that is no number, a shape that does not fit the bytes.
+pub fn parse(bytes: &[u8]) -> Result<Grid, String> {
     let rest = bytes.strip_prefix(b"\x93NUMPY").ok_or("it is not a .npy file")?;
     let (version, rest) = rest.split_first_chunk::<2>().ok_or("it ends inside its header")?;
     let (len, rest) = match version[0] {
@@ -64,12 +76,12 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Grid, String> {
         _ => (false, descr),
     };
     let count = shape.iter().try_fold(1_usize, |n, &d| n.checked_mul(d)).ok_or("its shape is too large")?;
-    let size = match kind {
-        "f4" => 4,
-        "f8" => 8,
-        _ => {
-            return Err(format!("it holds {descr:?}; only f32 ('<f4') and f64 ('<f8') can be transformed, convert it"));
-        }
+    let size = match kind.get(1..) {
+        Some("1") if matches!(kind, "i1" | "u1") => 1,
+        Some("2") if matches!(kind, "i2" | "u2") => 2,
+        Some("4") if matches!(kind, "f4" | "i4" | "u4") => 4,
+        Some("8") if matches!(kind, "f8" | "i8" | "u8") => 8,
+        _ => return Err(format!("it holds {descr:?}; f4, f8 and integers (i1 to i8, u1 to u8) are read, convert it")),
     };
     if count.checked_mul(size) != Some(data.len()) {
         return Err(format!("its shape {shape:?} of {descr} needs {count} values, the file has {} bytes", data.len()));
@@ -78,19 +90,25 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Grid, String> {
         Ok("True") => transposed_index(at, &shape),
         _ => at,
     };
-    let at = |i: usize, n: usize| &data[order(i) * n..][..n];
-    let values = if size == 4 {
-        let read = |i| {
-            let b: [u8; 4] = at(i, 4).try_into().unwrap_or_default();
-            if big { f32::from_be_bytes(b) } else { f32::from_le_bytes(b) }
-        };
-        Values::F32((0..count).map(read).collect())
-    } else {
-        let read = |i| {
-            let b: [u8; 8] = at(i, 8).try_into().unwrap_or_default();
-            if big { f64::from_be_bytes(b) } else { f64::from_le_bytes(b) }
-        };
-        Values::F64((0..count).map(read).collect())
+    // the bytes of an element, little-endian, in the low end of eight
+    let at = |i: usize| {
+        let mut b = [0; 8];
+        b[..size].copy_from_slice(&data[order(i) * size..][..size]);
+        if big {
+            b[..size].reverse();
+        }
+        b
+    };
+    let low = |i: usize| <[u8; 4]>::try_from(&at(i)[..4]).unwrap_or_default();
+    let values = match kind.as_bytes()[0] {
+        b'f' if size == 4 => Values::F32((0..count).map(|i| f32::from_le_bytes(low(i))).collect()),
+        b'f' => Values::F64((0..count).map(|i| f64::from_le_bytes(at(i))).collect()),
+        b'u' => Values::F64((0..count).map(|i| u64::from_le_bytes(at(i)) as f64).collect()),
+        _ => {
+            // an arithmetic shift keeps the sign
+            let empty = 64 - 8 * size as u32;
+            Values::F64((0..count).map(|i| ((i64::from_le_bytes(at(i)) << empty) >> empty) as f64).collect())
+        }
     };
     Ok(Grid { shape, values })
 }
@@ -105,8 +123,8 @@ fn transposed_index(mut at: usize, shape: &[usize]) -> usize {
     index.iter().zip(shape).rev().fold(0, |sum, (i, n)| sum * n + i)
 }
 
-/// A file with the given grid.
-pub(crate) fn write(grid: &Grid) -> Vec<u8> {
+/// A file with the given grid, little-endian, C order.
+pub fn write(grid: &Grid) -> Vec<u8> {
     let descr = if matches!(grid.values, Values::F32(_)) { "<f4" } else { "<f8" };
     let dims: Vec<String> = grid.shape.iter().map(usize::to_string).collect();
     let shape = if dims.len() == 1 { format!("({},)", dims[0]) } else { format!("({})", dims.join(", ")) };
@@ -123,20 +141,6 @@ pub(crate) fn write(grid: &Grid) -> Vec<u8> {
         Values::F64(v) => v.iter().for_each(|x| out.extend_from_slice(&x.to_le_bytes())),
     }
     out
-}
-
-/// Writes all bytes to a neighbour first, then renames it: a file is there whole or not at all.
-pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), String> {
-    let name = path.file_name().ok_or_else(|| format!("{}: not a file name", path.display()))?;
-    let mut part = name.to_os_string();
-    part.push(format!(".{}.part", std::process::id()));
-    let part = path.with_file_name(part);
-    let done = std::fs::write(&part, bytes).and_then(|()| std::fs::rename(&part, path));
-    done.map_err(|e| {
-        // The unfinished neighbour may not exist; the error to report is the first one.
-        let _ = std::fs::remove_file(&part);
-        format!("{}: cannot be written: {e}", path.display())
-    })
 }
 
 #[cfg(test)]
@@ -163,6 +167,17 @@ mod tests {
             file.extend_from_slice(&x.to_be_bytes());
         }
         let grid = Grid { shape: vec![2, 3], values: Values::F32(vec![0.0, 1.0, 2.0, 3.0, 4.0, 5.0]) };
+        assert_eq!(parse(&file), Ok(grid));
+    }
+
+    #[test]
+    fn integers_are_read_with_their_sign() {
+        let header = "{'descr': '<i2', 'fortran_order': False, 'shape': (3,), }\n";
+        let mut file = b"\x93NUMPY\x01\x00".to_vec();
+        file.extend_from_slice(&(header.len() as u16).to_le_bytes());
+        file.extend_from_slice(header.as_bytes());
+        [-5_i16, 7, i16::MIN].iter().for_each(|x| file.extend_from_slice(&x.to_le_bytes()));
+        let grid = Grid { shape: vec![3], values: Values::F64(vec![-5.0, 7.0, -32768.0]) };
         assert_eq!(parse(&file), Ok(grid));
     }
 
