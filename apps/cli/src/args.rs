@@ -1,5 +1,7 @@
 //! What the user typed, not yet judged.
 
+pub(crate) mod shape;
+
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
 
@@ -34,6 +36,8 @@ pub(crate) enum Command {
     Info(InfoArgs),
     /// Transform arrays and pictures into a wavelet basis and back
     Transform(crate::transform::TransformArgs),
+    /// Move control points of any level of a curve or surface
+    Edit(shape::EditArgs),
 }
 
 #[derive(Debug, clap::Args)]

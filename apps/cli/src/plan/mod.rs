@@ -1,6 +1,7 @@
 //! What is going to be done, judged before anything is computed.
 
 pub(crate) mod light;
+pub(crate) mod shape;
 pub(crate) mod values;
 
 use crate::run::Refusal;

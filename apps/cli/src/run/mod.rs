@@ -1,9 +1,12 @@
 //! Doing it.
 
+pub(crate) mod edit;
 pub(crate) mod info;
 pub(crate) mod light;
 pub(crate) mod probe;
 pub(crate) mod verify;
+mod shape_input;
+mod shape_output;
 
 use ondelette_io::ReadError;
 use ondelette_io::onl::OnlError;

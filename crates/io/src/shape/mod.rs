@@ -8,6 +8,7 @@
 //! | STEP, IGES ([`step`], [`iges`]) | B-spline curves and surfaces, rational too | the same |
 //! | OBJ, GLB ([`mesh`]) | | triangles by tolerance |
 //! | height fields ([`height`]) | .npy, .asc, .png (8 and 16 bits) | .npy, .asc, .png (16 bits) |
+//! | pictures ([`picture`]) | | .png of curves, combs, shaded surfaces |
 //!
 //! Readers take bytes or text and return a value or a sentence that says where what is wrong; damaged files neither
 //! panic nor hang, their work is bounded by their length. Writers return text or bytes for
@@ -18,6 +19,7 @@ pub mod height;
 pub mod iges;
 pub mod mesh;
 mod part21;
+pub mod picture;
 pub mod points;
 pub mod step;
 pub mod svg;

@@ -1,0 +1,72 @@
+//! Arguments of the commands on curves and surfaces.
+
+use std::path::PathBuf;
+
+/// What is written, and how it looks: the same for all commands on shapes.
+#[derive(Debug, clap::Args)]
+pub(crate) struct ShapeOutputs {
+    /// What to write; may be repeated. The ending says what. Curves: .svg .json .csv .step .igs .png; surfaces: .glb
+    /// .obj .json .npy .step .igs .png
+    #[arg(short = 'o', long = "output", value_name = "PATH")]
+    pub(crate) outputs: Vec<PathBuf>,
+
+    /// Largest distance of meshes and .csv points from the shape [default: 2e-4 of its size]
+    #[arg(long, value_name = "DISTANCE", allow_hyphen_values = true)]
+    pub(crate) flatness: Option<String>,
+
+    /// Draw the curvature comb on .png pictures of curves
+    #[arg(long)]
+    pub(crate) comb: bool,
+
+    /// Draw zebra stripes on .png pictures of surfaces
+    #[arg(long)]
+    pub(crate) zebra: bool,
+}
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  ondelette edit wing.json --level 2 --move 3 0,0.5 -o wing2.json -o wing2.png
+  ondelette edit logo.svg --part 0 --level 2 --move 4 1,0 --detail turning -o logo2.svg
+  ondelette edit bowl.json --level 1 --move 2,3 0,0,0.4 -o bowl.glb -o bowl.png --zebra
+  ondelette edit wing.json --level 3 --pull 0.25 -,0.1 -o wing2.svg
+  ondelette edit coast.json --see 2.5 -o smooth.svg
+
+Level 0 is the coarsest; without --level the finest is edited. Control points are counted from 0 in the stored array \
+of their level; on a fractional level such as 2.5 in that of the level above. Edits are done in the order: moves, then \
+pulls, then --see.")]
+pub(crate) struct EditArgs {
+    /// Shape: .json (with points), .svg, .step, .igs
+    #[arg(value_name = "SHAPE")]
+    pub(crate) shape: PathBuf,
+
+    /// Level whose control points are moved, 0 to the finest; fractions lie between levels [default: the finest]
+    #[arg(long, value_name = "R", allow_hyphen_values = true)]
+    pub(crate) level: Option<String>,
+
+    /// Move a control point of the level: INDEX is i on curves, i,j on surfaces; may be repeated
+    #[arg(long = "move", num_args = 2, value_names = ["INDEX", "dx,dy,dz"], allow_hyphen_values = true,
+          action = clap::ArgAction::Append)]
+    pub(crate) moves: Vec<String>,
+
+    /// Pull the point at a parameter (t, or s,t) to a place, by the least change of the level's control points; - leaves
+    /// a coordinate free; may be repeated
+    #[arg(long = "pull", num_args = 2, value_names = ["AT", "x,y,z"], allow_hyphen_values = true,
+          action = clap::ArgAction::Append)]
+    pub(crate) pulls: Vec<String>,
+
+    /// What finer detail does when the sweep below it turns: fixed (keeps x, y, z), turning (turns with it), frames
+    /// (tangent, normal, binormal per wavelet as in the thesis, section 6.2.1; curves only)
+    #[arg(long, default_value = "fixed", value_name = "HOW")]
+    pub(crate) detail: String,
+
+    /// Write the smooth version of this level instead of the whole shape
+    #[arg(long, value_name = "LEVEL", allow_hyphen_values = true)]
+    pub(crate) see: Option<String>,
+
+    /// Which path, curve or surface of a file that holds several, counted from 0 (surfaces first)
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    pub(crate) part: Option<String>,
+
+    #[command(flatten)]
+    pub(crate) out: ShapeOutputs,
+}
