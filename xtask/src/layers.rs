@@ -31,7 +31,7 @@ const OURS: [(&str, &[&str]); 9] = [
 ];
 
 /// Foreign crates that only some of ours may use, and why.
-const OWNED: [(&str, &[&str], &str); 16] = [
+const OWNED: [(&str, &[&str], &str); 17] = [
     ("rayon", &["ondelette-numerics"], "results must not depend on the number of threads"),
     ("clap", &["ondelette"], "libraries know no command line"),
     ("ctrlc", &["ondelette"], "libraries know no signals"),
@@ -42,6 +42,7 @@ const OWNED: [(&str, &[&str], &str); 16] = [
     ("postcard", &["ondelette-io"], "engines know no file format"),
     ("tobj", &["ondelette-io"], "engines know no file format"),
     ("xxhash-rust", &["ondelette-io"], "engines know no file format"),
+    ("roxmltree", &["ondelette-io"], "engines know no file format"),
     ("serde_json", &["ondelette-io", "ondelette", "xtask"], "engines know no file format"),
     ("obvhs", &["ondelette-radiosity"], "rays are the business of light"),
     (

@@ -1,4 +1,4 @@
-//! NumPy's `.npy` files: f32 and f64 as they are, integers as f64.
+//! NumPy's `.npy` files: f32 and f64, and integers where asked for.
 
 /// Values of a grid in one of the two types the transforms run in.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,6 +53,18 @@ fn entry<'a>(header: &'a str, key: &str) -> Result<&'a str, String> {
 /// # Errors
 /// A sentence: no such file, an element type that is no number, a shape that does not fit the bytes.
 pub fn parse(bytes: &[u8]) -> Result<Grid, String> {
+    read(bytes, false)
+}
+
+/// As [`parse`], and integers of 1 to 8 bytes as f64.
+///
+/// # Errors
+/// As [`parse`].
+pub fn parse_numbers(bytes: &[u8]) -> Result<Grid, String> {
+    read(bytes, true)
+}
+
+fn read(bytes: &[u8], integers: bool) -> Result<Grid, String> {
     let rest = bytes.strip_prefix(b"\x93NUMPY").ok_or("it is not a .npy file")?;
     let (version, rest) = rest.split_first_chunk::<2>().ok_or("it ends inside its header")?;
     let (len, rest) = match version[0] {
@@ -77,11 +89,14 @@ pub fn parse(bytes: &[u8]) -> Result<Grid, String> {
     };
     let count = shape.iter().try_fold(1_usize, |n, &d| n.checked_mul(d)).ok_or("its shape is too large")?;
     let size = match kind.get(1..) {
-        Some("1") if matches!(kind, "i1" | "u1") => 1,
-        Some("2") if matches!(kind, "i2" | "u2") => 2,
-        Some("4") if matches!(kind, "f4" | "i4" | "u4") => 4,
-        Some("8") if matches!(kind, "f8" | "i8" | "u8") => 8,
-        _ => return Err(format!("it holds {descr:?}; f4, f8 and integers (i1 to i8, u1 to u8) are read, convert it")),
+        Some("1") if integers && matches!(kind, "i1" | "u1") => 1,
+        Some("2") if integers && matches!(kind, "i2" | "u2") => 2,
+        Some("4") if kind == "f4" || integers && matches!(kind, "i4" | "u4") => 4,
+        Some("8") if kind == "f8" || integers && matches!(kind, "i8" | "u8") => 8,
+        _ if integers => return Err(format!("it holds {descr:?}; floats and integers are read, convert it")),
+        _ => {
+            return Err(format!("it holds {descr:?}; only f32 ('<f4') and f64 ('<f8') can be transformed, convert it"));
+        }
     };
     if count.checked_mul(size) != Some(data.len()) {
         return Err(format!("its shape {shape:?} of {descr} needs {count} values, the file has {} bytes", data.len()));
@@ -178,7 +193,8 @@ mod tests {
         file.extend_from_slice(header.as_bytes());
         [-5_i16, 7, i16::MIN].iter().for_each(|x| file.extend_from_slice(&x.to_le_bytes()));
         let grid = Grid { shape: vec![3], values: Values::F64(vec![-5.0, 7.0, -32768.0]) };
-        assert_eq!(parse(&file), Ok(grid));
+        assert_eq!(parse_numbers(&file), Ok(grid));
+        assert!(parse(&file).is_err());
     }
 
     #[test]

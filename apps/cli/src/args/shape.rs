@@ -48,8 +48,8 @@ pub(crate) struct EditArgs {
           action = clap::ArgAction::Append)]
     pub(crate) moves: Vec<String>,
 
-    /// Pull the point at a parameter (t, or s,t) to a place, by the least change of the level's control points; - leaves
-    /// a coordinate free; may be repeated
+    /// Pull the point at a parameter (t, or s,t) to a place, by the least change of the level's control points; -
+    /// leaves a coordinate free; may be repeated
     #[arg(long = "pull", num_args = 2, value_names = ["AT", "x,y,z"], allow_hyphen_values = true,
           action = clap::ArgAction::Append)]
     pub(crate) pulls: Vec<String>,

@@ -68,7 +68,10 @@ impl OutputPlan {
             let format = Format::of(path).filter(|f| OF_CURVES.contains(f) || OF_SURFACES.contains(f));
             let format = format.ok_or_else(|| {
                 let name = path.display();
-                format!("{name}: unknown ending; curves: .svg .json .csv .step .igs .png, surfaces: .glb .obj .json .npy .asc .step .igs .png")
+                format!(
+                    "{name}: unknown ending; curves: .svg .json .csv .step .igs .png, surfaces: .glb .obj .json \
+                     .npy .asc .step .igs .png"
+                )
             })?;
             files.push((path.clone(), format));
         }

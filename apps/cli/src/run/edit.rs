@@ -11,22 +11,21 @@ use std::fmt::Display;
 pub(crate) fn run(plan: &EditPlan) -> Result<Outcome, Refusal> {
     let Loaded { mut document, splines, place } = shape_input::read(&plan.shape, plan.part)?;
     plan.out.check_kind(matches!(document.geometry, Geometry::Curve(_)))?;
-    let geometry = match &document.geometry {
+    let (geometry, control) = match &document.geometry {
         Geometry::Curve(c) => {
-            Geometry::Curve(edited(plan, CurveLadder::new(c).map_err(said)?, c.dim(), 1, &mut document.edit_levels)?)
+            let ladder = CurveLadder::new(c).map_err(said)?;
+            let (curve, control) = edited(plan, ladder, c.dim(), 1, &mut document.edit_levels)?;
+            (Geometry::Curve(curve), Some(control))
         }
-        Geometry::Surface(s) => Geometry::Surface(edited(
-            plan,
-            SurfaceLadder::new(s).map_err(said)?,
-            s.dim(),
-            2,
-            &mut document.edit_levels,
-        )?),
+        Geometry::Surface(s) => {
+            let ladder = SurfaceLadder::new(s).map_err(said)?;
+            (Geometry::Surface(edited(plan, ladder, s.dim(), 2, &mut document.edit_levels)?.0), None)
+        }
         Geometry::None => return Err(Refusal::new("there is no shape to edit")),
     };
     let document = Document { geometry, ..document };
     let around = (!splines.curves.is_empty() || !splines.surfaces.is_empty()).then_some((&splines, place));
-    Outgoing { document: &document, around, marks: Vec::new() }.write(&plan.out)?;
+    Outgoing { document: &document, around, marks: Vec::new(), control }.write(&plan.out)?;
     Ok(Outcome::Done)
 }
 
@@ -34,14 +33,15 @@ fn said(e: impl Display) -> Refusal {
     Refusal::new(e.to_string())
 }
 
-/// All edits of the plan on one ladder; notes the do level and the see level.
+/// All edits of the plan on one ladder; notes the do level and the see level. The shape, and the control points that
+/// were at hand.
 fn edited<L: Ladder>(
     plan: &EditPlan,
     ladder: L,
     dim: usize,
     axes: usize,
     levels: &mut Option<[f64; 2]>,
-) -> Result<L::Shape, Refusal> {
+) -> Result<(L::Shape, Vec<[f64; 3]>), Refusal> {
     let mut editor = Editor::new(ladder);
     let finest = editor.levels() as f64;
     let level = plan.level.unwrap_or(finest);
@@ -75,7 +75,8 @@ fn edited<L: Ladder>(
     }
     let see = plan.see.unwrap_or(finest);
     *levels = Some([level, see]);
-    editor.seen_at(see).map_err(said)
+    let control = editor.fractional(level).map_err(said)?.1;
+    Ok((editor.seen_at(see).map_err(said)?, control))
 }
 
 /// As many numbers as the shape has coordinates; further ones must be 0.

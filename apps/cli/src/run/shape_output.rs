@@ -19,6 +19,8 @@ pub(crate) struct Outgoing<'a> {
     pub(crate) around: Option<(&'a Splines, usize)>,
     /// Constraints to be drawn.
     pub(crate) marks: Vec<Mark>,
+    /// Control points to be drawn with a curve; its own if left out.
+    pub(crate) control: Option<Vec<[f64; 3]>>,
 }
 
 /// Finest meshes of pictures.
@@ -89,7 +91,12 @@ impl Outgoing<'_> {
         let others = around.iter().enumerate().filter(|(i, _)| *i != place).map(|(_, c)| c as &dyn ParametricCurve);
         let curves: Vec<&dyn ParametricCurve> = std::iter::once(curve as &dyn ParametricCurve).chain(others).collect();
         let closed = curve.closed();
-        let control = if closed { curve.points().to_vec() } else { curve.in_space().points().to_vec() };
+        let control = match &self.control {
+            // heights have no place in the plane of their own
+            Some(control) if curve.dim() > 1 => control.clone(),
+            _ if closed => curve.points().to_vec(),
+            _ => curve.in_space().points().to_vec(),
+        };
         let with = CurvePicture {
             comb: plan.comb,
             control,

@@ -1,5 +1,6 @@
 //! The program as its users meet it: files, exit codes, messages.
 
+mod edit;
 mod light;
 mod probe;
 mod program;

@@ -69,7 +69,7 @@ impl HeightField {
 /// # Errors
 /// A sentence: a broken file, another number of axes, infinite heights.
 pub fn read_npy(bytes: &[u8]) -> Result<HeightField, String> {
-    let grid = npy::parse(bytes)?;
+    let grid = npy::parse_numbers(bytes)?;
     let &[rows, columns] = grid.shape.as_slice() else {
         return Err(format!("its shape {:?} has not two axes", grid.shape));
     };

@@ -10,7 +10,8 @@ use crate::shape::{Curve, CurveJet, ParametricCurve};
 /// use ondelette_modeling::{free::{FreeCurve, Knots}, shape::ParametricCurve};
 /// let knots = Knots::new(2, vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0], 3)?;
 /// let half = 0.5_f64.sqrt();
-/// let arc = FreeCurve::new(2, knots, vec![[1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]], Some(vec![1.0, half, 1.0]))?;
+/// let points = vec![[1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+/// let arc = FreeCurve::new(2, knots, points, Some(vec![1.0, half, 1.0]))?;
 /// let p = arc.jet(0.3).point;
 /// assert!((p[0].hypot(p[1]) - 1.0).abs() < 1e-15, "a quarter of a circle");
 /// # Ok::<(), ondelette_modeling::free::FreeError>(())
