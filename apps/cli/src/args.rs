@@ -16,6 +16,8 @@ use std::path::PathBuf;
   ondelette light room.glb --error 1%              out/room.png, out/room.glb, out/room.json
   ondelette probe room.onl points.csv -o out.csv   irradiance and radiosity at points
   ondelette verify room.onl                        an independent check of the promised error
+  ondelette curve arch.json -o arch.svg            the smoothest curve under constraints
+  ondelette edit logo.svg --level 2 --move 3 1,0 -o logo2.svg
 
 Exit codes: 0 done; 1 a valid result that is unfinished or misses its tolerance; 2 bad input or usage."
 )]
@@ -36,6 +38,10 @@ pub(crate) enum Command {
     Info(InfoArgs),
     /// Transform arrays and pictures into a wavelet basis and back
     Transform(crate::transform::TransformArgs),
+    /// The smoothest curve under constraints
+    Curve(shape::CurveArgs),
+    /// The smoothest surface under constraints
+    Surface(shape::SurfaceArgs),
     /// Move control points of any level of a curve or surface
     Edit(shape::EditArgs),
 }

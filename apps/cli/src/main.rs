@@ -34,6 +34,8 @@ fn dispatch(command: Command) -> Result<Outcome, Refusal> {
         Command::Probe(args) => run::probe::run(&args),
         Command::Verify(args) => run::verify::run(&args),
         Command::Info(args) => run::info::run(&args),
+        Command::Curve(args) => run::design::run(&plan::shape::DesignPlan::new(&args.design, 1)?),
+        Command::Surface(args) => run::design::run(&plan::shape::DesignPlan::new(&args.design, 2)?),
         Command::Edit(args) => run::edit::run(&plan::shape::EditPlan::new(&args)?),
         Command::Transform(args) => transform::run(&args).map(|()| Outcome::Done).map_err(Refusal::new),
     }

@@ -30,6 +30,14 @@ impl Stages {
         self.last = now;
     }
 
+    /// Seconds by stage, and in all.
+    pub(crate) fn json(&self) -> Value {
+        let mut out: serde_json::Map<String, Value> =
+            self.spent.iter().map(|(stage, seconds)| ((*stage).to_owned(), json!(seconds))).collect();
+        out.insert("total".to_owned(), json!(self.total()));
+        out.into()
+    }
+
     fn total(&self) -> f64 {
         self.last.duration_since(self.start).as_secs_f64()
     }

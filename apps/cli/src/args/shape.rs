@@ -70,3 +70,57 @@ pub(crate) struct EditArgs {
     #[command(flatten)]
     pub(crate) out: ShapeOutputs,
 }
+
+/// What `curve` and `surface` share.
+#[derive(Debug, clap::Args)]
+pub(crate) struct DesignArgs {
+    /// Specification: a JSON document (docs/formats/shape.md)
+    #[arg(value_name = "SPEC.json")]
+    pub(crate) spec: PathBuf,
+
+    /// Solve with this instead of what the document says: auto, spectral, banded, bpx, wavelet, multigrid, cholesky,
+    /// thesis-wavelet, thesis-bspline
+    #[arg(long, value_name = "NAME")]
+    pub(crate) solver: Option<String>,
+
+    /// Write the report here: energy, misses of the constraints by id, iterations, seconds per stage, the solver and why
+    #[arg(long, value_name = "PATH")]
+    pub(crate) report: Option<PathBuf>,
+
+    #[command(flatten)]
+    pub(crate) out: ShapeOutputs,
+}
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example, arch.json:
+  { \"levels\": 5, \"energy\": { \"bend\": 1 }, \"constraints\": [
+      { \"id\": \"foot\", \"at\": 0, \"position\": [0, 0], \"tangent\": [0, 6] },
+      { \"id\": \"top\", \"at\": 0.5, \"position\": [1, 2] },
+      { \"id\": \"end\", \"at\": 1, \"position\": [3, 0] } ] }
+
+  ondelette curve arch.json -o arch.svg -o arch.png --comb
+  ondelette curve arch.json -o arch.step --solver cholesky --report arch-report.json
+
+Of all curves that meet the constraints the one of least energy is found; Ctrl-C writes the state reached. Exit codes: 0 \
+done, 1 not converged, 2 bad input.")]
+pub(crate) struct CurveArgs {
+    #[command(flatten)]
+    pub(crate) design: DesignArgs,
+}
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example, tent.json (one number a position: heights over the domain):
+  { \"levels\": 5, \"energy\": { \"stretch\": 0.1, \"bend\": 1 }, \"constraints\": [
+      { \"at\": [0, 0], \"position\": [0] }, { \"at\": [1, 0], \"position\": [0] },
+      { \"at\": [0, 1], \"position\": [0] }, { \"at\": [1, 1], \"position\": [0] },
+      { \"at\": [0.5, 0.5], \"position\": [1] } ] }
+
+  ondelette surface tent.json -o tent.glb -o tent.png --zebra
+  ondelette surface tent.json -o tent.npy --report tent-report.json
+
+Of all surfaces that meet the constraints the one of least energy is found; Ctrl-C writes the state reached. Exit codes: 0 \
+done, 1 not converged, 2 bad input.")]
+pub(crate) struct SurfaceArgs {
+    #[command(flatten)]
+    pub(crate) design: DesignArgs,
+}

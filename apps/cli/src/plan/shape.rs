@@ -1,7 +1,7 @@
 //! Plans of the commands on curves and surfaces.
 
 use super::check_distinct;
-use crate::args::shape::{EditArgs, ShapeOutputs};
+use crate::args::shape::{DesignArgs, EditArgs, ShapeOutputs};
 use crate::run::Refusal;
 use ondelette_io::write::check_writable;
 use ondelette_modeling::edit::Orientation;
@@ -173,5 +173,30 @@ impl EditPlan {
             part: part.transpose()?,
             out: OutputPlan::new(&args.out, &[&args.shape], None)?,
         })
+    }
+}
+
+/// `ondelette curve` and `ondelette surface`, checked.
+#[derive(Clone, Debug)]
+pub(crate) struct DesignPlan {
+    pub(crate) spec: PathBuf,
+    /// 1: curve, 2: surface.
+    pub(crate) axes: usize,
+    pub(crate) solver: Option<String>,
+    pub(crate) report: Option<PathBuf>,
+    pub(crate) out: OutputPlan,
+}
+
+impl DesignPlan {
+    pub(crate) fn new(args: &DesignArgs, axes: usize) -> Result<DesignPlan, Refusal> {
+        let out = OutputPlan::new(&args.out, &[&args.spec], args.report.as_deref())?;
+        out.check_kind(axes == 1)?;
+        Ok(DesignPlan { spec: args.spec.clone(), axes, solver: args.solver.clone(), report: args.report.clone(), out })
+    }
+
+    /// Folders in which files are made.
+    pub(crate) fn folders(&self) -> Vec<PathBuf> {
+        let paths = self.out.files.iter().map(|f| &f.0).chain(&self.report);
+        paths.filter_map(|p| p.parent()).map(Path::to_path_buf).collect()
     }
 }

@@ -1,5 +1,6 @@
 //! Doing it.
 
+pub(crate) mod design;
 pub(crate) mod edit;
 pub(crate) mod info;
 pub(crate) mod light;

@@ -1,0 +1,251 @@
+//! `ondelette curve` and `ondelette surface`: the smoothest shape under constraints.
+
+use super::shape_input::read_text;
+use super::shape_output::Outgoing;
+use super::{Outcome, Refusal, tell};
+use crate::interrupt::Stop;
+use crate::plan::shape::DesignPlan;
+use crate::report::Stages;
+use ondelette_io::shape::picture::Mark;
+use ondelette_io::shape::{ConstraintSpec, Document, Geometry};
+use ondelette_io::write::write_bytes;
+use ondelette_modeling::Axis;
+use ondelette_modeling::constraint::{Constraint, Demand};
+use ondelette_modeling::energy::{Energy, Stiffness};
+use ondelette_modeling::shape::{Curve, ParametricCurve, ParametricSurface, Surface};
+use ondelette_modeling::solve::{Method, Settings, Solution, Solver};
+use ondelette_modeling::system::{Problem, Space};
+use serde_json::{Value, json};
+use std::fmt::Display;
+
+pub(crate) fn run(plan: &DesignPlan) -> Result<Outcome, Refusal> {
+    let stop = Stop::new(None, plan.folders())?;
+    let mut stages = Stages::start();
+    let named = |e: &dyn Display| Refusal::new(format!("{}: {e}", plan.spec.display()));
+    let mut document = Document::read(&read_text(&plan.spec)?, Some(plan.axes)).map_err(|e| named(&e))?;
+    if let Some(solver) = &plan.solver {
+        document.solver.clone_from(solver);
+    }
+    let problem = problem(&document).map_err(|e| named(&e))?;
+    let method: Method = document.solver.parse().map_err(|e| named(&e))?;
+    let settings = Settings { method, tolerance: document.tolerance, ..Settings::default() };
+    stages.end("read");
+
+    let mut solver = Solver::new(problem.clone(), settings).map_err(|e| named(&e))?;
+    stages.end("prepare");
+    let mut stopped = false;
+    while solver.step().is_some() {
+        stopped = stop.signalled();
+        if stopped {
+            tell("stopped by Ctrl-C: what follows is the state reached");
+            break;
+        }
+    }
+    let solution = solver.solution();
+    stages.end("solve");
+    document.geometry = geometry(&document.axes, &solution).map_err(|e| named(&e))?;
+    let out = Outgoing { document: &document, around: None, marks: marks(&document, &problem), control: None };
+    out.write(&plan.out)?;
+    stages.end("write");
+    if let Some(path) = &plan.report {
+        let report = report(&document, &problem, &solution, &stages);
+        write_bytes(path, format!("{report:#}\n").as_bytes())?;
+    }
+    let (method, _) = solution.method();
+    let worst = solution.residuals().iter().filter(|r| !r.soft).fold(0.0_f64, |m, r| m.max(r.miss.abs()));
+    let points = solution.space().len();
+    tell(format_args!(
+        "{points} control points, {} constraints, solver {method}: energy {:.6e}, largest miss {worst:.1e}",
+        problem.constraints().len(),
+        solution.energy(),
+    ));
+    solution.notes().iter().for_each(|note| tell(format_args!("note: {note}")));
+    if solution.converged() && !stopped {
+        return Ok(Outcome::Done);
+    }
+    tell("not converged: try another solver, fewer spans, or a larger tolerance");
+    Ok(Outcome::Unfinished)
+}
+
+/// The problem of a document.
+fn problem(document: &Document) -> Result<Problem, String> {
+    if document.adaptive {
+        return Err("adaptive: no solver of this version works on an adaptive set; leave it out".to_owned());
+    }
+    if document.constraints.is_empty() {
+        return Err("there are no constraints: nothing holds the shape anywhere".to_owned());
+    }
+    let coordinates = coordinates(&document.constraints)?;
+    let mut constraints = Vec::new();
+    for spec in &document.constraints {
+        constraints.extend(demands(spec)?);
+    }
+    let [stretch, bend, variation] = document.energy;
+    let energy = Energy::new(stretch, bend, variation).map_err(|e| e.to_string())?;
+    let space = space(&document.axes);
+    let stiffness = stiffness(document, &space)?;
+    Problem::new(space, coordinates, energy, stiffness, constraints).map_err(|e| e.to_string())
+}
+
+fn space(axes: &[Axis]) -> Space {
+    match *axes {
+        [s, t] => Space::surface(s, t),
+        _ => Space::curve(axes[0]),
+    }
+}
+
+/// Number of coordinates that the constraints speak of.
+fn coordinates(constraints: &[ConstraintSpec]) -> Result<usize, String> {
+    let mut found: Option<(usize, &str)> = None;
+    for spec in constraints {
+        let id = spec.id.as_deref().unwrap_or_default();
+        let lengths = [&spec.position, &spec.tangent, &spec.ds, &spec.dt].into_iter().flatten().map(Vec::len);
+        for n in lengths.chain(spec.normal.as_ref().map(Vec::len)) {
+            match found {
+                Some((m, first)) if m != n => {
+                    return Err(format!("constraint {id} has {n} coordinates, constraint {first} {m}"));
+                }
+                _ => found = Some((n, id)),
+            }
+        }
+    }
+    found.map(|f| f.0).ok_or_else(|| "no constraint says where the shape is: give positions".to_owned())
+}
+
+/// The demands of one constraint; the first bears its id, others say what they are.
+fn demands(spec: &ConstraintSpec) -> Result<Vec<Constraint>, String> {
+    let id = spec.id.clone().unwrap_or_default();
+    let mut found: Vec<(&str, Demand)> = Vec::new();
+    if let Some(p) = &spec.position {
+        found.push(("position", Demand::Position(p.clone())));
+    }
+    let derivatives = [("tangent", &spec.tangent, 0), ("ds", &spec.ds, 0), ("dt", &spec.dt, 1)];
+    for (name, value, axis) in derivatives {
+        if let Some(d) = value {
+            let fits = if name == "tangent" { spec.at.len() == 1 } else { spec.at.len() == 2 };
+            if !fits {
+                return Err(format!(
+                    "constraint {id}: {name} is for {}",
+                    if name == "tangent" { "curves" } else { "surfaces" }
+                ));
+            }
+            found.push((name, Demand::Derivative(axis, d.clone())));
+        }
+    }
+    if let Some(n) = &spec.normal {
+        found.push(("normal", Demand::Normal(n.clone())));
+    }
+    if let Some(k) = spec.curvature {
+        found.push(("curvature", Demand::Curvature(k)));
+    }
+    if found.is_empty() {
+        return Err(format!("constraint {id} asks for nothing: position, tangent, ds, dt, normal or curvature"));
+    }
+    let single = found.len() == 1;
+    let name = |i: usize, what: &str| if single || i == 0 { id.clone() } else { format!("{id}.{what}") };
+    let make = |(i, (what, demand)): (usize, (&str, Demand))| {
+        let mut c = Constraint::new(name(i, what), &spec.at, demand);
+        c.weight = spec.weight;
+        c
+    };
+    Ok(found.into_iter().enumerate().map(make).collect())
+}
+
+/// One factor a cell from the regions of the document.
+fn stiffness(document: &Document, space: &Space) -> Result<Option<Stiffness>, String> {
+    if document.stiffness.is_empty() {
+        return Ok(None);
+    }
+    let axes = &document.axes;
+    let middle = |axis: &Axis, i: usize| axis.from_knots(i as f64 + 0.5);
+    let width = axes.get(1).map_or(1, Axis::spans);
+    let factor = |cell: usize| {
+        let at: Vec<f64> = match axes.as_slice() {
+            [s, t] => vec![middle(s, cell / width), middle(t, cell % width)],
+            _ => vec![middle(&axes[0], cell)],
+        };
+        let inside = |r: &&ondelette_io::shape::Region| (0..at.len()).all(|a| (r.from[a]..=r.to[a]).contains(&at[a]));
+        document.stiffness.iter().rev().find(inside).map_or(1.0, |r| r.factor)
+    };
+    let cells = space.cells();
+    Stiffness::new(cells, (0..cells).map(factor).collect()).map(Some).map_err(|e| e.to_string())
+}
+
+fn geometry(axes: &[Axis], solution: &Solution) -> Result<Geometry, String> {
+    let x = solution.coefficients();
+    let point = |k: usize| std::array::from_fn(|c| x.get(c).map_or(0.0, |x| x[k]));
+    let points = (0..solution.space().len()).map(point).collect();
+    let shape = match *axes {
+        [s, t] => Surface::new([s, t], x.len(), points).map(Geometry::Surface),
+        _ => Curve::new(axes[0], x.len(), points).map(Geometry::Curve),
+    };
+    shape.map_err(|e| format!("the solution is no shape: {e}"))
+}
+
+/// What pictures show of the constraints.
+fn marks(document: &Document, problem: &Problem) -> Vec<Mark> {
+    let jet = |at: &[f64]| match &document.geometry {
+        Geometry::Curve(c) => {
+            let j = c.jet(at[0]);
+            Some((j.point, [j.first, j.first]))
+        }
+        Geometry::Surface(s) => {
+            let j = s.jet(at[0], at[1]);
+            Some((j.point, j.first))
+        }
+        Geometry::None => None,
+    };
+    let heights = problem.coordinates() == 1;
+    let place = |values: &[Option<f64>], here: [f64; 3]| -> [f64; 3] {
+        let shift = if heights { document.axes.len() } else { 0 };
+        std::array::from_fn(|c| match c.checked_sub(shift).and_then(|k| values.get(k)) {
+            Some(Some(v)) => *v,
+            _ => here[c],
+        })
+    };
+    let mut out = Vec::new();
+    for c in problem.constraints() {
+        let Some((here, first)) = jet(&c.at) else { continue };
+        match &c.demand {
+            Demand::Position(values) if c.weight.is_some() => out.push(Mark::Soft(place(values, here), here)),
+            Demand::Position(values) => out.push(Mark::Point(place(values, here))),
+            Demand::Derivative(axis, _) => out.push(Mark::Direction(here, first[*axis])),
+            Demand::Normal(n) => {
+                let n = std::array::from_fn(|k| n.get(k).copied().unwrap_or(0.0));
+                out.push(Mark::Direction(here, n));
+            }
+            _ => out.push(Mark::Point(here)),
+        }
+    }
+    out
+}
+
+fn report(document: &Document, problem: &Problem, solution: &Solution, stages: &Stages) -> Value {
+    // The same shape on a domain of unit spans: the energy in knot units.
+    let knots = |a: &Axis| Axis::new(a.boundary(), a.spans(), [0.0, a.spans() as f64]);
+    let knots: Vec<Axis> = document.axes.iter().filter_map(|a| knots(a).ok()).collect();
+    let unit = space(&knots);
+    let energy_knots: f64 =
+        solution.coefficients().iter().map(|x| problem.energy().of(&unit, problem.stiffness(), x)).sum();
+    let (method, why) = solution.method();
+    let mut residuals = serde_json::Map::new();
+    for r in solution.residuals() {
+        let worst = residuals.get(&r.id).and_then(Value::as_f64).unwrap_or(0.0);
+        residuals.insert(r.id.clone(), json!(worst.max(r.miss.abs())));
+    }
+    json!({
+        "energy": solution.energy(),
+        "energy_knots": energy_knots,
+        "residuals": residuals,
+        "iterations": solution.iterations(),
+        "control_points": solution.space().len(),
+        "active": solution.space().len(),
+        "coordinates": problem.coordinates(),
+        "converged": solution.converged(),
+        "solver": method.to_string(),
+        "why": why,
+        "tolerance": document.tolerance,
+        "notes": solution.notes(),
+        "seconds": stages.json(),
+    })
+}
