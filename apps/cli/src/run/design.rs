@@ -43,6 +43,10 @@ pub(crate) fn run(plan: &DesignPlan) -> Result<Outcome, Refusal> {
     }
     let solution = solver.solution();
     stages.end("solve");
+    // A solver that could not begin has no state worth writing.
+    if !solution.converged() && !stopped && solution.iterations() == 0 && !solution.notes().is_empty() {
+        return Err(named(&solution.notes().join("; ")));
+    }
     document.geometry = geometry(&document.axes, &solution).map_err(|e| named(&e))?;
     let out = Outgoing { document: &document, around: None, marks: marks(&document, &problem), control: None };
     out.write(&plan.out)?;
@@ -75,11 +79,11 @@ fn problem(document: &Document) -> Result<Problem, String> {
     if document.constraints.is_empty() {
         return Err("there are no constraints: nothing holds the shape anywhere".to_owned());
     }
-    let coordinates = coordinates(&document.constraints)?;
     let mut constraints = Vec::new();
     for spec in &document.constraints {
         constraints.extend(demands(spec)?);
     }
+    let coordinates = coordinates(&document.constraints)?;
     let [stretch, bend, variation] = document.energy;
     let energy = Energy::new(stretch, bend, variation).map_err(|e| e.to_string())?;
     let space = space(&document.axes);

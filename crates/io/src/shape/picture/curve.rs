@@ -65,7 +65,10 @@ pub fn curve(curves: &[&dyn ParametricCurve], with: &CurvePicture) -> Picture {
     canvas.line(&control, 1.2, FAINT, 0.7);
     // dots that would touch each other say nothing
     let crowded = control.windows(2).filter(|w| (w[0][0] - w[1][0]).hypot(w[0][1] - w[1][1]) < 9.0).count();
-    if 2 * crowded <= control.len() {
+    // nor do those that lie on the curve
+    let drawn: Vec<P> = fine.iter().flatten().map(|p| at(p.1)).collect();
+    let apart = |p: &P| drawn.iter().all(|q| (p[0] - q[0]).hypot(p[1] - q[1]) > 7.0);
+    if 2 * crowded <= control.len() && 2 * control.iter().filter(|p| apart(p)).count() > control.len() {
         control.iter().for_each(|p| canvas.disc(*p, 2.6, FAINT));
     }
     for comb in &combs {

@@ -1,0 +1,112 @@
+//! `ondelette curve` and `ondelette surface` from file to file.
+
+use crate::program::Place;
+use serde_json::{Value, json};
+
+fn document(place: &Place, name: &str) -> Value {
+    serde_json::from_str(&place.text(name)).unwrap()
+}
+
+#[test]
+fn the_natural_spline_comes_out_of_a_specification() {
+    let place = Place::new();
+    // Least bending through knots: the natural cubic spline through (0, 0), (1/2, 1), (1, 0) is 3 t - 4 t^3 up to 1/2,
+    // with energy 2 * int_0^(1/2) (24 t)^2 = 48.
+    place.write(
+        "arch.json",
+        r#"{ "levels": 3, "constraints": [ { "id": "a", "at": 0, "position": [0, 0] },
+            { "id": "b", "at": 0.5, "position": [1, null] }, { "id": "c", "at": 0.5, "position": [null, 1] },
+            { "id": "d", "at": 1, "position": [2, 0] } ] }"#,
+    );
+    place.run("curve arch.json -o out.json -o out.svg -o out.png --comb --report r.json").with_code(0);
+    let report = document(&place, "r.json");
+    let close = |v: &Value, want: f64| (v.as_f64().unwrap() - want).abs() < 1e-9 * want.abs().max(1.0);
+    assert!(close(&report["energy"], 48.0), "{report}");
+    assert!(close(&report["energy_knots"], 48.0 / 512.0), "{report}");
+    assert!(["a", "b", "c", "d"].iter().all(|id| close(&report["residuals"][id], 0.0)));
+    assert_eq!((&report["converged"], &report["active"]), (&json!(true), &json!(11)));
+    assert!(report["seconds"]["total"].is_number() && report["solver"].is_string() && report["why"].is_string());
+    // The document that comes out holds everything, goes in again, and edits.
+    place.run("curve out.json -o again.json").with_code(0);
+    assert_eq!(place.text("out.json"), place.text("again.json"));
+    assert_eq!(document(&place, "out.json")["constraints"][1]["position"], json!([1.0, null]));
+    place.run("edit out.json --level 1 --move 2 0,1 -o edited.json").with_code(0);
+    // All solvers agree.
+    let points = document(&place, "out.json")["points"].clone();
+    for solver in ["banded", "cholesky", "bpx", "multigrid"] {
+        place.run(&format!("curve arch.json --solver {solver} -o {solver}.json")).with_code(0);
+        let other = document(&place, &format!("{solver}.json"));
+        for k in 0..11 {
+            let miss = other["points"][k][1].as_f64().unwrap() - points[k][1].as_f64().unwrap();
+            assert!(miss.abs() < 1e-7, "{solver}: {miss}");
+        }
+    }
+}
+
+#[test]
+fn a_tilted_plane_is_found_and_written_in_every_format() {
+    let place = Place::new();
+    place.write(
+        "plane.json",
+        r#"{ "spans": [6, 9], "domain": [[0, 2], [0, 1]], "energy": { "bend": 1 }, "constraints": [
+            { "at": [0, 0], "position": 1 }, { "at": [2, 0], "position": 3 }, { "at": [1, 1], "position": 5 } ] }"#,
+    );
+    let outputs = "-o p.json -o p.npy -o p.glb -o p.obj -o p.step -o p.igs -o p.png -o p.asc --report r.json";
+    place.run(&format!("surface plane.json {outputs}")).with_code(0);
+    assert!(document(&place, "r.json")["energy"].as_f64().unwrap() < 1e-18);
+    // h = 1 + s + 3 t at the knots, in f64 after the header of 128 bytes
+    let npy = place.read("p.npy");
+    assert_eq!(npy.len(), 128 + 8 * 7 * 10);
+    for (k, bytes) in npy[128..].chunks(8).enumerate() {
+        let (s, t) = ((k / 10) as f64 / 3.0, (k % 10) as f64 / 9.0);
+        let h = f64::from_le_bytes(bytes.try_into().unwrap());
+        assert!((h - (1.0 + s + 3.0 * t)).abs() < 1e-9, "{s} {t}: {h}");
+    }
+    let help = place.run("surface --help").with_code(0);
+    assert!(help.out.contains("tent.json") && help.out.contains("--zebra"));
+}
+
+#[test]
+fn specifications_that_make_no_sense_are_refused_by_name() {
+    let place = Place::new();
+    let constraints = |c: &str| format!(r#"{{ "levels": 3, "constraints": [{c}] }}"#);
+    let a = r#"{ "id": "a", "at": 0.5, "position": [1, 2] }"#;
+    for (kind, text, said) in [
+        ("curve", String::new(), "line 1"),
+        ("curve", "{".to_owned(), "line 1"),
+        ("curve", "{}".to_owned(), "levels"),
+        ("curve", r#"{ "levels": 40 }"#.to_owned(), "GB"),
+        ("curve", constraints(""), "no constraints"),
+        ("curve", constraints(r#"{ "id": "q", "at": 0.5 }"#), "q asks for nothing"),
+        ("curve", constraints(r#"{ "id": "q", "at": 1.5, "position": [1, 2] }"#), "outside"),
+        ("curve", constraints(r#"{ "id": "q", "at": 0.5, "position": [1, 2], "weight": -1 }"#), "weight"),
+        ("curve", constraints(r#"{ "id": "q", "at": 0.5, "position": [1, 2, 3, 4] }"#), "4 coordinates"),
+        ("curve", constraints(r#"{ "id": "q", "at": 0.5, "ds": [1, 2] }"#), "surfaces"),
+        ("curve", constraints(&format!(r#"{a}, {{ "id": "b", "at": 0.1, "position": [1] }}"#)), "coordinates"),
+        ("curve", constraints(&format!("{a}, {a}")), "a"),
+        ("curve", constraints(&format!(r#"{a}, {{ "id": "b", "at": 0.5, "position": [1, 3] }}"#)), "b contradicts"),
+        ("curve", constraints(a).replace("{ \"levels\"", "{ \"solver\": \"magic\", \"levels\""), "magic"),
+        ("curve", constraints(a).replace("{ \"levels\"", "{ \"solver\": \"spectral\", \"levels\""), "spectral"),
+        ("curve", constraints(a).replace("{ \"levels\"", "{ \"adaptive\": true, \"levels\""), "adaptive"),
+        ("surface", constraints(a), "a"),
+        ("surface", r#"{ "kind": "curve", "levels": 3 }"#.to_owned(), "surface"),
+    ] {
+        place.write("spec.json", &text);
+        let before = place.names();
+        let ended = place.run(&format!("{kind} spec.json -o x.json")).with_code(2);
+        assert!(ended.err.starts_with("error: ") && ended.err.contains(said), "{text}: {}", ended.err);
+        assert!(!ended.err.contains("panicked"), "{}", ended.err);
+        assert_eq!(place.names(), before, "{text}");
+    }
+    place.write("spec.json", constraints(a));
+    for (arguments, said) in [
+        ("curve spec.json", "-o"),
+        ("curve spec.json -o x.glb", "curve"),
+        ("surface spec.json -o x.svg", "surface"),
+        ("curve spec.json -o spec.json", "overwritten"),
+        ("curve none.json -o x.json", "none.json"),
+    ] {
+        let ended = place.run(arguments).with_code(2);
+        assert!(ended.err.contains(said), "{arguments}: {}", ended.err);
+    }
+}
