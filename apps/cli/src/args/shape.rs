@@ -83,7 +83,7 @@ pub(crate) struct DesignArgs {
     #[arg(long, value_name = "NAME")]
     pub(crate) solver: Option<String>,
 
-    /// Write the report here: energy, misses of the constraints by id, iterations, seconds per stage, the solver and why
+    /// Write the report here: energy, misses by constraint, iterations, seconds per stage, the solver and why
     #[arg(long, value_name = "PATH")]
     pub(crate) report: Option<PathBuf>,
 
@@ -101,8 +101,8 @@ pub(crate) struct DesignArgs {
   ondelette curve arch.json -o arch.svg -o arch.png --comb
   ondelette curve arch.json -o arch.step --solver cholesky --report arch-report.json
 
-Of all curves that meet the constraints the one of least energy is found; Ctrl-C writes the state reached. Exit codes: 0 \
-done, 1 not converged, 2 bad input.")]
+Of all curves that meet the constraints the one of least energy is found; Ctrl-C writes the state reached. \
+Exit codes: 0 done, 1 not converged, 2 bad input.")]
 pub(crate) struct CurveArgs {
     #[command(flatten)]
     pub(crate) design: DesignArgs,
@@ -118,8 +118,8 @@ pub(crate) struct CurveArgs {
   ondelette surface tent.json -o tent.glb -o tent.png --zebra
   ondelette surface tent.json -o tent.npy --report tent-report.json
 
-Of all surfaces that meet the constraints the one of least energy is found; Ctrl-C writes the state reached. Exit codes: 0 \
-done, 1 not converged, 2 bad input.")]
+Of all surfaces that meet the constraints the one of least energy is found; Ctrl-C writes the state reached. \
+Exit codes: 0 done, 1 not converged, 2 bad input.")]
 pub(crate) struct SurfaceArgs {
     #[command(flatten)]
     pub(crate) design: DesignArgs,

@@ -5,9 +5,9 @@ pub(crate) mod edit;
 pub(crate) mod info;
 pub(crate) mod light;
 pub(crate) mod probe;
-pub(crate) mod verify;
 mod shape_input;
 mod shape_output;
+pub(crate) mod verify;
 
 use ondelette_io::ReadError;
 use ondelette_io::onl::OnlError;
