@@ -332,3 +332,33 @@ fn bad_input_is_named() {
     ));
     let _ = basis::taps(&a, 0.0, 0);
 }
+
+#[test]
+fn curvature_is_met_by_newton_steps() {
+    let a = Axis::new(Boundary::Open, 32, [0.0, 1.0]).unwrap();
+    let at = |i: usize, t: f64, p: [f64; 2]| {
+        Constraint::new(format!("p{i}"), &[t], Demand::Position(vec![Some(p[0]), Some(p[1])]))
+    };
+    let bend = |id: &str, t: f64, k: f64| Constraint::new(id, &[t], Demand::Curvature(k));
+    let rows = vec![at(0, 0.0, [0.0, 0.0]), at(1, 0.5, [1.0, 0.4]), at(2, 1.0, [2.0, 0.0]), bend("k", 0.3, -2.5)];
+    let problem = Problem::new(Space::curve(a), 2, Energy::BEND, None, rows).unwrap();
+    let solution = solve(&problem, Method::Auto, 1e-9).unwrap();
+    assert!(solution.converged());
+    let (d, e) = (solution.eval(&[0.3], [1, 0]), solution.eval(&[0.3], [2, 0]));
+    let k = (d[0] * e[1] - d[1] * e[0]) / (d[0] * d[0] + d[1] * d[1]).powf(1.5);
+    assert!((k + 2.5).abs() < 1e-8, "{k}");
+    assert!(solution.residuals().iter().all(|r| r.miss.abs() < 1e-8));
+}
+
+#[test]
+fn the_thesis_iterates_to_the_same_shapes() {
+    let a = axis(Boundary::Mirrored, 16);
+    let rows = (0..5).map(|i| point(i, &[4.0 * i as f64], seed::unit(i as u64))).collect();
+    let problem = Problem::new(Space::curve(a), 1, Energy::BEND, None, rows).unwrap();
+    let want = solve(&problem, Method::Banded, 1e-10).unwrap();
+    for method in [Method::ThesisBspline, Method::ThesisWavelet] {
+        let got = solve(&problem, method, 1e-8).unwrap();
+        assert!(far(&got.coefficients()[0], &want.coefficients()[0]) < 1e-6, "{method}");
+        assert!(got.iterations() > 5);
+    }
+}

@@ -3,6 +3,7 @@
 //! A [`Constraint`] becomes one or more rows of A x = b over the coefficients of all coordinates: a position or
 //! derivative one row a coordinate that it fixes, a normal two rows that couple the coordinates.
 
+pub(crate) mod curvature;
 mod functional;
 mod row;
 

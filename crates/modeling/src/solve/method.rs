@@ -1,5 +1,6 @@
 //! Which method, and how exactly.
 
+use ondelette_wavelet::Scaling;
 use serde::{Deserialize, Serialize};
 
 /// How the saddle system is solved.
@@ -67,10 +68,23 @@ pub struct Settings {
     pub tolerance: f64,
     /// Iterations of all corrections together after which a solver gives up (an outcome, not an error).
     pub most_iterations: usize,
+    /// False: one correction only, unrefined.
+    pub refine: bool,
+    /// Heights of wavelets, where they are used; `None`: the exact diagonal of the energy.
+    pub scaling: Option<Scaling>,
+    /// Methods of the thesis: steepest descent in place of conjugate gradients.
+    pub steepest: bool,
 }
 
 impl Default for Settings {
     fn default() -> Settings {
-        Settings { method: Method::Auto, tolerance: 1e-8, most_iterations: 100_000 }
+        Settings {
+            method: Method::Auto,
+            tolerance: 1e-8,
+            most_iterations: 100_000,
+            refine: true,
+            scaling: None,
+            steepest: false,
+        }
     }
 }

@@ -11,12 +11,13 @@ mod correct;
 mod cosine;
 mod green;
 mod method;
-mod multigrid;
+pub(crate) mod multigrid;
 mod projected;
 mod refine;
 mod solution;
 mod sparse;
 mod spectral;
+mod thesis;
 mod transfer;
 mod wavelet;
 

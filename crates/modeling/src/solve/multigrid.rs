@@ -8,6 +8,7 @@ use super::green::{Green, Inverse};
 use super::transfer::Transfer;
 use crate::constraint::Functional;
 use crate::energy::{Energy, Operator, Scratch, Stiffness};
+use crate::fit::Normal;
 use crate::system::{Space, Structure};
 use std::sync::Arc;
 
@@ -48,6 +49,8 @@ struct Level {
     n: usize,
     rows: Arc<SparseRows>,
     weights: Arc<Vec<f64>>,
+    /// Sums over scattered data.
+    data: Option<Arc<Normal>>,
     inverse: Vec<f64>,
     /// Largest eigenvalue of D^-1 H.
     largest: f64,
@@ -99,6 +102,9 @@ impl Level {
             let by = w * value;
             self.rows.row(r).for_each(|(c, v)| y[c] += by * v);
         }
+        if let Some(data) = &self.data {
+            data.add(x, y);
+        }
     }
 
     /// Chebyshev smoothing of (H + A^T W A) x = b; `zero` when x is zero on entry.
@@ -147,6 +153,23 @@ impl Cycle {
         structure: Option<&Structure>,
         weights: &[f64],
     ) -> Option<Cycle> {
+        Cycle::build(space, energy, stiffness, h, structure, weights, &[])
+    }
+
+    /// H plus sums over scattered data, given for every level down to 60 coefficients or odd spans.
+    pub(crate) fn with_data(space: &Space, energy: &Energy, h: &Operator, data: &[Arc<Normal>]) -> Option<Cycle> {
+        Cycle::build(space, energy, None, h, None, &[], data)
+    }
+
+    fn build(
+        space: &Space,
+        energy: &Energy,
+        stiffness: Option<&Stiffness>,
+        h: &Operator,
+        structure: Option<&Structure>,
+        weights: &[f64],
+        data: &[Arc<Normal>],
+    ) -> Option<Cycle> {
         let k = structure.map_or(1, |s| s.k);
         let weights = Arc::new(weights.to_vec());
         let mut levels = Vec::new();
@@ -169,9 +192,10 @@ impl Cycle {
                 if n * k > 3000 {
                     return None;
                 }
+                let data = data.get(levels.len());
                 let coarse = match structure {
-                    Some(_) => coarsest(&operator, &rows, &weights, k)?,
-                    None => dense_factor(&operator, energy)?,
+                    None if data.is_none() => dense_factor(&operator, energy)?,
+                    _ => coarsest(&operator, &rows, &weights, k, data.map(|d| &**d))?,
                 };
                 return Some(Cycle { levels, transfers, coarse, k, work: Vec::new() });
             };
@@ -180,12 +204,17 @@ impl Cycle {
                 // repeated columns of short axes add before they are squared; this bound is on the safe side
                 rows.row(r).for_each(|(c, v)| diagonal[c] += w * v * v);
             }
+            let data = data.get(levels.len()).cloned();
+            if let Some(data) = &data {
+                diagonal.iter_mut().zip(data.diagonal()).for_each(|(d, v)| *d += v);
+            }
             let zeros = vec![0.0; n * k];
             let mut level = Level {
                 h: operator,
                 n,
                 rows: Arc::new(rows),
                 weights: weights.clone(),
+                data,
                 inverse: diagonal.into_iter().map(|d| 1.0 / d).collect(),
                 largest: 1.0,
                 b: zeros.clone(),
@@ -214,6 +243,41 @@ impl Cycle {
     /// True where there is nothing but the coarsest level.
     pub(crate) fn is_direct(&self) -> bool {
         self.levels.is_empty()
+    }
+
+    /// Conjugate gradients on (H + data) x = b from the given x, to a relative residual (in the cycle's norm).
+    pub(crate) fn conjugate_gradients(&mut self, b: &[f64], x: &mut [f64], tolerance: f64, most: usize) {
+        if self.is_direct() {
+            self.cycle(b, x);
+            return;
+        }
+        let n = b.len();
+        let (mut r, mut z, mut p, mut hp) = (vec![0.0; n], vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+        self.cycle(b, &mut z);
+        let goal = dot(b, &z) * tolerance * tolerance;
+        self.apply(x, &mut hp);
+        r.iter_mut().zip(b).zip(&hp).for_each(|((r, b), h)| *r = b - h);
+        self.cycle(&r, &mut z);
+        let mut rz = dot(&r, &z);
+        p.copy_from_slice(&z);
+        for _ in 0..most {
+            if rz <= goal || rz.is_nan() {
+                break;
+            }
+            self.apply(&p, &mut hp);
+            let curvature = dot(&p, &hp);
+            if curvature <= 0.0 || !curvature.is_finite() {
+                break;
+            }
+            let alpha = rz / curvature;
+            x.iter_mut().zip(&p).for_each(|(x, p)| *x += alpha * p);
+            r.iter_mut().zip(&hp).for_each(|(r, h)| *r -= alpha * h);
+            self.cycle(&r, &mut z);
+            let old = rz;
+            rz = dot(&r, &z);
+            let beta = rz / old;
+            p.iter_mut().zip(&z).for_each(|(p, z)| *p = z + beta * *p);
+        }
     }
 
     /// One V-cycle from zero: an approximate inverse, symmetric.
@@ -268,7 +332,7 @@ impl Cycle {
     }
 }
 
-fn coarsest(h: &Operator, rows: &SparseRows, weights: &[f64], k: usize) -> Option<Cholesky> {
+fn coarsest(h: &Operator, rows: &SparseRows, weights: &[f64], k: usize, data: Option<&Normal>) -> Option<Cholesky> {
     let n = h.len();
     let mut packed = vec![0.0; start(n * k)];
     let mut size = 0.0_f64;
@@ -286,6 +350,9 @@ fn coarsest(h: &Operator, rows: &SparseRows, weights: &[f64], k: usize) -> Optio
                 packed[start(c) + d] += w * v * u;
             }
         }
+    }
+    if let Some(data) = data {
+        data.entries(|r, c, v| packed[start(r) + c] += v);
     }
     Cholesky::new(&packed, n * k).ok().or_else(|| {
         (0..n * k).for_each(|i| packed[start(i) + i] += 1e-10 * size);

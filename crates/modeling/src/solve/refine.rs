@@ -10,7 +10,9 @@ use super::projected::Projected;
 use super::solution::{Residual, Solution};
 use super::sparse::SparseSolver;
 use super::spectral::Spectral;
+use super::thesis::Squared;
 use super::wavelet::WaveletGreen;
+use crate::constraint::curvature;
 use crate::energy::{Operator, Scratch, twofold};
 use crate::system::{Block, Problem, ProblemError, Structure};
 use ondelette_wavelet::Boundary;
@@ -81,7 +83,8 @@ pub struct Solver {
     h: Arc<Operator>,
     blocks: Vec<(Arc<Structure>, Block)>,
     notes: Vec<String>,
-    corrector: Option<Box<dyn Correct>>,
+    /// One a block, kept for other targets.
+    correctors: Vec<Option<Box<dyn Correct>>>,
     at: (usize, usize),
     /// Unknowns and multipliers of every side, block by block.
     sides: Vec<Vec<SideState>>,
@@ -89,6 +92,7 @@ pub struct Solver {
     iterations: usize,
     scratch: Scratch,
     converged: bool,
+    newton: usize,
 }
 
 #[derive(Clone, Debug, Default)]
@@ -131,35 +135,25 @@ impl Solver {
                 format!("constraint {} follows from {}: redundant", name(&r.constraint), others.join(", "))
             })
             .collect();
-        let sides = blocks
-            .iter()
-            .map(|b| {
-                let one = |_| SideState {
-                    x: vec![0.0; b.structure.unknowns()],
-                    multipliers: vec![0.0; b.structure.rows()],
-                    change: f64::INFINITY,
-                    miss: f64::INFINITY,
-                    ..SideState::default()
-                };
-                b.sides.iter().map(one).collect()
-            })
-            .collect();
-        let blocks = blocks.into_iter().map(|b| (Arc::new(b.structure.clone()), b)).collect();
+        let sides = fresh_sides(&blocks);
+        let blocks: Vec<(Arc<Structure>, Block)> =
+            blocks.into_iter().map(|b| (Arc::new(b.structure.clone()), b)).collect();
         Ok(Solver {
             problem,
             settings,
             method,
             why,
             h,
+            correctors: (0..blocks.len()).map(|_| None).collect(),
             blocks,
             notes,
-            corrector: None,
             at: (0, 0),
             sides,
             stage: Stage::Residual,
             iterations: 0,
             scratch: Scratch::default(),
             converged: true,
+            newton: 0,
         })
     }
 
@@ -189,8 +183,17 @@ impl Solver {
     /// # Errors
     /// [`SolveError::Degenerate`].
     pub fn run(mut self) -> Result<Solution, SolveError> {
-        while self.advance()?.is_some() {}
+        self.finish()?;
         Ok(self.solution())
+    }
+
+    /// Steps to the end and stays.
+    ///
+    /// # Errors
+    /// [`SolveError::Degenerate`].
+    pub fn finish(&mut self) -> Result<(), SolveError> {
+        while self.advance()?.is_some() {}
+        Ok(())
     }
 
     fn advance(&mut self) -> Result<Option<Step>, SolveError> {
@@ -199,6 +202,9 @@ impl Solver {
         }
         let (b, s) = self.at;
         if b >= self.blocks.len() {
+            if self.converged && self.linearise()? {
+                return self.advance();
+            }
             self.stage = Stage::Finished;
             return Ok(None);
         }
@@ -207,10 +213,10 @@ impl Solver {
             self.at = (b + 1, 0);
             return self.advance();
         }
-        if self.corrector.is_none() {
-            self.corrector = Some(self.corrector_of(b)?);
+        if self.correctors[b].is_none() {
+            self.correctors[b] = Some(self.corrector_of(b)?);
         }
-        let Some(corrector) = self.corrector.as_mut() else { return Ok(None) };
+        let Some(corrector) = self.correctors[b].as_mut() else { return Ok(None) };
         if self.stage == Stage::Residual {
             if self.sides[b][s].corrections == 0 {
                 corrector.restart();
@@ -235,7 +241,7 @@ impl Solver {
     /// Adds a finished correction; decides whether another is worth it.
     fn finish_correction(&mut self, stop: bool) {
         let (b, s) = self.at;
-        let Some(corrector) = self.corrector.as_ref() else { return };
+        let Some(corrector) = self.correctors[b].as_ref() else { return };
         let (dx, dl) = corrector.correction();
         let finite = dx.iter().all(|v| v.is_finite());
         let (most, progress) = corrector.patience();
@@ -256,7 +262,7 @@ impl Solver {
         }
         // The energy of a long curve feels errors far below those of its coefficients.
         let goal = self.settings.tolerance * if self.h.lines.len() == 1 { 1e-4 } else { 1.0 };
-        let enough = change <= goal && miss <= 2e-14 * size.max(max(targets));
+        let enough = !self.settings.refine || change <= goal && miss <= 2e-14 * size.max(max(targets));
         let stalled = side.corrections > 0 && change > progress * side.change && miss > progress * side.miss;
         side.corrections += 1;
         let last = side.corrections >= most || !finite || stop;
@@ -272,12 +278,52 @@ impl Solver {
                 self.at = (b, s + 1);
             } else {
                 self.at = (b + 1, 0);
-                self.corrector = None;
             }
         }
         if stop {
             self.stage = Stage::Finished;
         }
+    }
+
+    /// Newton's step for curvature constraints: rows linear around the shape so far. False when they are met.
+    fn linearise(&mut self) -> Result<bool, SolveError> {
+        let coefficients = self.coefficients();
+        let found = curvature::rows(&self.problem, &coefficients);
+        if found.miss <= self.settings.tolerance.max(1e-12) * found.size {
+            return Ok(false);
+        }
+        self.newton += 1;
+        if self.newton > NEWTON {
+            self.notes.push(format!("a curvature is missed by {:.1e} after {NEWTON} Newton steps", found.miss));
+            self.converged = false;
+            return Ok(false);
+        }
+        for id in found.degenerate {
+            self.notes.push(format!("constraint {id}: the tangent has collapsed, so there is no curvature to ask for"));
+        }
+        let mut rows = self.problem.rows();
+        rows.extend(found.rows);
+        let (blocks, _) = self.problem.blocks(rows)?;
+        self.sides = fresh_sides(&blocks);
+        self.blocks = blocks.into_iter().map(|b| (Arc::new(b.structure.clone()), b)).collect();
+        self.correctors = (0..self.blocks.len()).map(|_| None).collect();
+        self.at = (0, 0);
+        self.stage = Stage::Residual;
+        Ok(true)
+    }
+
+    /// The coefficients so far, coordinate by coordinate.
+    pub fn coefficients(&self) -> Vec<Vec<f64>> {
+        let n = self.problem.space().len();
+        let mut coefficients = vec![vec![0.0; n]; self.problem.coordinates()];
+        for ((_, block), sides) in self.blocks.iter().zip(&self.sides) {
+            for (side, state) in block.sides.iter().zip(sides) {
+                for (i, c) in side.coordinates.iter().enumerate() {
+                    coefficients[*c].copy_from_slice(&state.x[i * n..][..n]);
+                }
+            }
+        }
+        coefficients
     }
 
     fn corrector_of(&mut self, b: usize) -> Result<Box<dyn Correct>, SolveError> {
@@ -313,8 +359,17 @@ impl Solver {
                 let solver = Multigrid::new(space, energy, map, &self.h, structure, 1e-3, most);
                 return Ok(Box::new(solver.ok_or_else(|| unfit("the spans do not halve often enough"))?));
             }
+            Method::ThesisWavelet | Method::ThesisBspline => {
+                let basis = (self.method == Method::ThesisWavelet)
+                    .then(|| WaveletGreen::new(space, energy, &self.h, self.settings.scaling))
+                    .map(|basis| basis.ok_or_else(|| unfit("the axes have no common pyramid")))
+                    .transpose()?;
+                let tolerance = self.settings.tolerance * 1e-3;
+                let steepest = self.settings.steepest;
+                return Ok(Box::new(Squared::new(self.h.clone(), structure, basis, steepest, tolerance, most)));
+            }
             Method::Wavelet => {
-                let green = WaveletGreen::new(space, energy, &self.h, None);
+                let green = WaveletGreen::new(space, energy, &self.h, self.settings.scaling);
                 Box::new(green.ok_or_else(|| unfit("the axes have no common pyramid"))?)
             }
             _ => Box::new(
@@ -328,20 +383,106 @@ impl Solver {
         projected.map(|p| Box::new(p) as Box<dyn Correct>).map_err(degenerate)
     }
 
-    /// The solution so far.
-    pub fn solution(&self) -> Solution {
-        let problem = &self.problem;
-        let n = problem.space().len();
-        let mut coefficients = vec![vec![0.0; n]; problem.coordinates()];
-        for ((_, block), sides) in self.blocks.iter().zip(&self.sides) {
-            for (side, state) in block.sides.iter().zip(sides) {
-                for (i, c) in side.coordinates.iter().enumerate() {
-                    coefficients[*c].copy_from_slice(&state.x[i * n..][..n]);
+    /// Takes other targets for the same constraints, keeping all factors; the next steps solve for them.
+    ///
+    /// # Errors
+    /// The problem differs in more than targets ([`SolveError::Method`] says so), or its constraints conflict.
+    pub fn retarget(&mut self, problem: Problem) -> Result<(), SolveError> {
+        let (blocks, _) = problem.blocks(problem.rows())?;
+        let same = blocks.len() == self.blocks.len()
+            && self.newton == 0
+            && blocks.iter().zip(&self.blocks).all(|(new, (old, block))| {
+                new.structure.terms == old.terms
+                    && new.structure.give == old.give
+                    && new.structure.functionals == old.functionals
+                    && new.sides.len() == block.sides.len()
+            })
+            && problem.space() == self.problem.space()
+            && problem.energy() == self.problem.energy()
+            && problem.stiffness() == self.problem.stiffness();
+        if !same {
+            return Err(SolveError::Method {
+                method: self.method,
+                why: "the problem differs in more than its targets",
+            });
+        }
+        self.sides = fresh_sides(&blocks);
+        for ((_, old), new) in self.blocks.iter_mut().zip(blocks) {
+            *old = new;
+        }
+        self.problem = problem;
+        self.at = (0, 0);
+        self.stage = Stage::Residual;
+        self.iterations = 0;
+        self.converged = true;
+        Ok(())
+    }
+
+    /// The Green column of a row: how the coefficients answer to one unit of its target, coordinate by coordinate.
+    ///
+    /// Rows are numbered as in [`Solution::residuals`], redundant ones left out by name. Costs one solution with the
+    /// factors at hand. `None` for redundant rows and for curvature.
+    ///
+    /// # Errors
+    /// [`SolveError::Degenerate`].
+    pub fn response(&mut self, constraint: &str, part: usize) -> Result<Option<Vec<(usize, Vec<f64>)>>, SolveError> {
+        let Some(number) = self.problem.constraints().iter().position(|c| c.id == constraint) else { return Ok(None) };
+        if self.newton > 0 {
+            return Ok(None);
+        }
+        // Rows of a constraint come in order, but each in the block of its coordinate.
+        let mut seen = 0;
+        let mut place = None;
+        let coordinates = self.problem.coordinates();
+        'search: for c in 0..coordinates {
+            for (b, (_, block)) in self.blocks.iter().enumerate() {
+                for (s, side) in block.sides.iter().enumerate().filter(|(_, s)| s.coordinates.first() == Some(&c)) {
+                    for r in (0..side.constraints.len()).filter(|r| side.constraints[*r] == number) {
+                        if seen == part {
+                            place = Some((b, s, r));
+                            break 'search;
+                        }
+                        seen += 1;
+                    }
                 }
             }
         }
+        let Some((b, s, r)) = place else { return Ok(None) };
+        let kept = (self.at, self.stage, self.iterations, self.converged);
+        let zero = {
+            let structure = &self.blocks[b].0;
+            let mut targets = vec![0.0; structure.rows()];
+            targets[r] = 1.0 / structure.lengths[r];
+            targets
+        };
+        let side = &mut self.blocks[b].1.sides[s];
+        let targets = std::mem::replace(&mut side.targets, zero);
+        let fresh = fresh_sides(std::slice::from_ref(&self.blocks[b].1)).pop().and_then(|mut s| s.pop());
+        let state = std::mem::replace(&mut self.sides[b][s], fresh.unwrap_or_default());
+        self.at = (b, s);
+        self.stage = Stage::Residual;
+        let mut outcome = Ok(());
+        while self.at == (b, s) && self.stage != Stage::Finished {
+            if let Err(e) = self.advance() {
+                outcome = Err(e);
+                break;
+            }
+        }
+        let column = std::mem::replace(&mut self.sides[b][s], state);
+        self.blocks[b].1.sides[s].targets = targets;
+        (self.at, self.stage, self.iterations, self.converged) = kept;
+        outcome?;
+        let n = self.problem.space().len();
+        let of = |(i, c): (usize, &usize)| (*c, column.x[i * n..][..n].to_vec());
+        Ok(Some(self.blocks[b].1.sides[s].coordinates.iter().enumerate().map(of).collect()))
+    }
+
+    /// The solution so far.
+    pub fn solution(&self) -> Solution {
+        let problem = &self.problem;
+        let coefficients = self.coefficients();
         let energy = coefficients.iter().map(|x| self.h.energy(x)).sum();
-        let residuals = problem
+        let mut residuals: Vec<Residual> = problem
             .rows()
             .iter()
             .map(|row| {
@@ -350,6 +491,7 @@ impl Solver {
                 Residual { id, soft: row.give > 0.0, miss: (value - row.target) * row.length }
             })
             .collect();
+        residuals.extend(curvature::rows(problem, &coefficients).misses);
         Solution::new(
             problem.space().clone(),
             coefficients,
@@ -362,6 +504,23 @@ impl Solver {
         )
     }
 }
+
+fn fresh_sides(blocks: &[Block]) -> Vec<Vec<SideState>> {
+    let of = |b: &Block| {
+        let one = |_| SideState {
+            x: vec![0.0; b.structure.unknowns()],
+            multipliers: vec![0.0; b.structure.rows()],
+            change: f64::INFINITY,
+            miss: f64::INFINITY,
+            ..SideState::default()
+        };
+        b.sides.iter().map(one).collect()
+    };
+    blocks.iter().map(of).collect()
+}
+
+/// Newton steps after which curvature constraints are given up.
+const NEWTON: usize = 40;
 
 /// The rule of [`Method::Auto`], and what each method needs.
 fn choose(problem: &Problem, h: &Operator, asked: Method) -> Result<(Method, &'static str), SolveError> {

@@ -83,7 +83,8 @@ impl Solution {
         &self.notes
     }
 
-    /// The point at a parameter (`[t]` or `[s, t]`), or a derivative of the given orders, in domain units.
+    /// The point at a parameter (`[t]` or `[s, t]`), or a derivative of the given orders along s and t (curves: the
+    /// first), in domain units.
     ///
     /// # Panics
     /// If `at` has another number of parameters than the space has axes.

@@ -22,6 +22,8 @@ pub(crate) struct WaveletGreen {
     corner: Vec<usize>,
     coarse: Cholesky,
     space: Space,
+    /// Heights that give every function unit energy (the corner: as its level has elsewhere).
+    heights: Vec<f64>,
 }
 
 impl WaveletGreen {
@@ -100,7 +102,25 @@ impl WaveletGreen {
             }
         }
         let coarse = dense_factor(&Operator::new(&now, energy, None), energy)?;
-        Some(WaveletGreen { tensor, inverse: values, corner, coarse, space: now })
+        let mut heights: Vec<f64> = values.iter().map(|v| v.sqrt()).collect();
+        let tallest = heights.iter().fold(0.0, |m: f64, v| m.max(*v));
+        corner.iter().for_each(|i| heights[*i] = tallest);
+        Some(WaveletGreen { tensor, inverse: values, corner, coarse, space: now, heights })
+    }
+
+    /// Coefficients of functions of unit energy to B-spline coefficients.
+    pub(crate) fn synthesis(&self, w: &[f64]) -> Vec<f64> {
+        let w: Vec<f64> = w.iter().zip(&self.heights).map(|(w, h)| w * h).collect();
+        let mut out = vec![0.0; w.len()];
+        if self.tensor.down_into(Kind::Coefficients, &w, &mut out).is_err() {
+            out.fill(0.0);
+        }
+        out
+    }
+
+    /// The transpose of [`WaveletGreen::synthesis`].
+    pub(crate) fn synthesis_transposed(&self, y: &[f64]) -> Vec<f64> {
+        self.to_wavelets(y).into_iter().zip(&self.heights).map(|(w, h)| w * h).collect()
     }
 
     fn to_wavelets(&self, r: &[f64]) -> Vec<f64> {
