@@ -27,9 +27,6 @@ pub(crate) struct Line {
 impl Line {
     pub(crate) fn new(axis: &Axis) -> Line {
         let (boundary, spans, n) = (axis.boundary(), axis.spans(), axis.len());
-        // Identical interiors let a short line stand for a long one.
-        let short = spans.min(if boundary == Boundary::Periodic { spans } else { 24 });
-        let _ = short;
         let differences: [Stencil; 4] = std::array::from_fn(|a| difference(boundary, spans, n, a));
         let gram: [Stencil; 4] = std::array::from_fn(|a| gram(boundary, spans, a, None));
         let transposed: [Stencil; 4] = std::array::from_fn(|a| differences[a].transposed());

@@ -47,7 +47,12 @@ fn sized(v: &mut Vec<f64>, n: usize) -> &mut [f64] {
 
 impl Operator {
     pub(crate) fn new(space: &Space, energy: &Energy, stiffness: Option<&Stiffness>) -> Operator {
-        let lines: Vec<Line> = space.axes().iter().map(Line::new).collect();
+        let mut lines: Vec<Line> = Vec::with_capacity(2);
+        for axis in space.axes() {
+            // Axes alike share the work.
+            let known = lines.iter().find(|l| (l.boundary, l.spans) == (axis.boundary(), axis.spans())).cloned();
+            lines.push(known.unwrap_or_else(|| Line::new(axis)));
+        }
         let weights = [energy.stretch, energy.bend, energy.variation];
         let mut terms = Vec::new();
         let density: Vec<f64> = space.axes().iter().map(crate::axis::Axis::density).collect();

@@ -106,7 +106,7 @@ struct Fold {
     normals: Vec<Arc<Normal>>,
     right: Vec<f64>,
     out: Vec<usize>,
-    /// The last solution, where the next starts.
+    /// The last solution.
     x: Vec<f64>,
 }
 
@@ -242,7 +242,8 @@ impl Choice<'_> {
         let (mut sum, mut count) = (0.0, 0);
         let mut folds = std::mem::take(&mut self.folds);
         for fold in &mut folds {
-            self.solve(fold, weight, stiffening, 1e-3)?;
+            fold.x.fill(0.0);
+            self.solve(fold, weight, stiffening, 1e-4)?;
             for &i in &fold.out {
                 sum += (eval(&self.spaces[0], &fold.x, self.data.points[i]) - self.values[i]).powi(2);
                 count += 1;

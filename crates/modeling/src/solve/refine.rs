@@ -481,7 +481,6 @@ impl Solver {
     pub fn solution(&self) -> Solution {
         let problem = &self.problem;
         let coefficients = self.coefficients();
-        let energy = coefficients.iter().map(|x| self.h.energy(x)).sum();
         let mut residuals: Vec<Residual> = problem
             .rows()
             .iter()
@@ -495,7 +494,7 @@ impl Solver {
         Solution::new(
             problem.space().clone(),
             coefficients,
-            energy,
+            self.h.clone(),
             residuals,
             (self.method, self.why),
             self.iterations,

@@ -2,7 +2,9 @@
 
 use super::method::Method;
 use crate::basis;
+use crate::energy::Operator;
 use crate::system::Space;
+use std::sync::Arc;
 
 /// How far a constraint row is missed.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,7 +22,7 @@ pub struct Residual {
 pub struct Solution {
     space: Space,
     coefficients: Vec<Vec<f64>>,
-    energy: f64,
+    h: Arc<Operator>,
     residuals: Vec<Residual>,
     method: (Method, &'static str),
     iterations: usize,
@@ -33,14 +35,14 @@ impl Solution {
     pub(crate) fn new(
         space: Space,
         coefficients: Vec<Vec<f64>>,
-        energy: f64,
+        h: Arc<Operator>,
         residuals: Vec<Residual>,
         method: (Method, &'static str),
         iterations: usize,
         converged: bool,
         notes: Vec<String>,
     ) -> Solution {
-        Solution { space, coefficients, energy, residuals, method, iterations, converged, notes }
+        Solution { space, coefficients, h, residuals, method, iterations, converged, notes }
     }
 
     /// Where the coefficients live.
@@ -53,9 +55,9 @@ impl Solution {
         &self.coefficients
     }
 
-    /// The energy, in domain units (soft rows not included).
+    /// The energy, in domain units (soft rows not included). Linear time.
     pub fn energy(&self) -> f64 {
-        self.energy
+        self.coefficients.iter().map(|x| self.h.energy(x)).sum()
     }
 
     /// The miss of every constraint row, in the order of the constraints.

@@ -79,7 +79,7 @@ impl Squared {
             self.h.apply(x, y, &mut self.scratch);
         }
         self.structure.add_transposed(l, self.scale, &mut y);
-        let y = self.from_splines(&y);
+        let y = self.out_of_splines(&y);
         out.clear();
         out.extend(y);
         for (r, l) in l.iter().enumerate() {
@@ -95,7 +95,7 @@ impl Squared {
         }
     }
 
-    fn from_splines(&self, y: &[f64]) -> Vec<f64> {
+    fn out_of_splines(&self, y: &[f64]) -> Vec<f64> {
         match &self.basis {
             Some(b) => y.chunks_exact(self.structure.n).flat_map(|y| b.synthesis_transposed(y)).collect(),
             None => y.to_vec(),
@@ -111,7 +111,7 @@ impl Squared {
 
 impl Correct for Squared {
     fn begin(&mut self, r1: &[f64], r2: &[f64]) {
-        self.r = self.from_splines(r1);
+        self.r = self.out_of_splines(r1);
         self.r.extend(r2.iter().map(|r| r * self.scale));
         self.z = vec![0.0; self.r.len()];
         let r = std::mem::take(&mut self.r);
