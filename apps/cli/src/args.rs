@@ -42,6 +42,8 @@ pub(crate) enum Command {
     Curve(shape::CurveArgs),
     /// The smoothest surface under constraints
     Surface(shape::SurfaceArgs),
+    /// Smoothing splines through measured points, height fields, outlines
+    Fit(shape::FitArgs),
     /// Move control points of any level of a curve or surface
     Edit(shape::EditArgs),
 }

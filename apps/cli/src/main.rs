@@ -36,6 +36,7 @@ fn dispatch(command: Command) -> Result<Outcome, Refusal> {
         Command::Info(args) => run::info::run(&args),
         Command::Curve(args) => run::design::run(&plan::shape::DesignPlan::new(&args.design, 1)?),
         Command::Surface(args) => run::design::run(&plan::shape::DesignPlan::new(&args.design, 2)?),
+        Command::Fit(args) => run::fit::run(&plan::shape::FitPlan::new(&args)?),
         Command::Edit(args) => run::edit::run(&plan::shape::EditPlan::new(&args)?),
         Command::Transform(args) => transform::run(&args).map(|()| Outcome::Done).map_err(Refusal::new),
     }

@@ -124,3 +124,45 @@ pub(crate) struct SurfaceArgs {
     #[command(flatten)]
     pub(crate) design: DesignArgs,
 }
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  ondelette fit terrain.csv -o terrain.json -o terrain.png      x,y,height a line
+  ondelette fit scan.npy --weight 1e-3 -o smooth.npy --report fit.json
+  ondelette fit wing.dat --fair --tolerance 1e-3 -o wing.svg -o wing.png --comb
+
+Smoothing weight and stiffening are chosen by cross-validation unless given. Height fields: rows run along s, \
+columns along t; not-a-number and NODATA cells are gaps.")]
+pub(crate) struct FitArgs {
+    /// Scattered heights (.csv of x,y,height), a height field (.npy, .asc, grey .png) or an outline (.dat, .svg, .csv
+    /// of x,y)
+    #[arg(value_name = "POINTS")]
+    pub(crate) data: PathBuf,
+
+    /// Weight of the energy against the sum of squared misses [default: chosen]
+    #[arg(long, value_name = "W", allow_hyphen_values = true)]
+    pub(crate) weight: Option<String>,
+
+    /// Square root of stretch over bend, per side of the domain [default: chosen]
+    #[arg(long, value_name = "S", allow_hyphen_values = true)]
+    pub(crate) stiffening: Option<String>,
+
+    /// Spans a direction, a power of two [default: by the number of points]
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    pub(crate) spans: Option<String>,
+
+    /// Even the curvature of an outline without moving a point further than --tolerance
+    #[arg(long)]
+    pub(crate) fair: bool,
+
+    /// How far --fair may move a point
+    #[arg(long, value_name = "DISTANCE", allow_hyphen_values = true)]
+    pub(crate) tolerance: Option<String>,
+
+    /// Write the report here: misses, what was chosen, seconds per stage
+    #[arg(long, value_name = "PATH")]
+    pub(crate) report: Option<PathBuf>,
+
+    #[command(flatten)]
+    pub(crate) out: ShapeOutputs,
+}

@@ -1,7 +1,7 @@
 //! Plans of the commands on curves and surfaces.
 
 use super::check_distinct;
-use crate::args::shape::{DesignArgs, EditArgs, ShapeOutputs};
+use crate::args::shape::{DesignArgs, EditArgs, FitArgs, ShapeOutputs};
 use crate::run::Refusal;
 use ondelette_io::write::check_writable;
 use ondelette_modeling::edit::Orientation;
@@ -198,5 +198,45 @@ impl DesignPlan {
     pub(crate) fn folders(&self) -> Vec<PathBuf> {
         let paths = self.out.files.iter().map(|f| &f.0).chain(&self.report);
         paths.filter_map(|p| p.parent()).map(Path::to_path_buf).collect()
+    }
+}
+
+/// `ondelette fit`, checked.
+#[derive(Clone, Debug)]
+pub(crate) struct FitPlan {
+    pub(crate) data: PathBuf,
+    pub(crate) weight: Option<f64>,
+    pub(crate) stiffening: Option<f64>,
+    pub(crate) spans: Option<usize>,
+    pub(crate) fair: bool,
+    pub(crate) tolerance: Option<f64>,
+    pub(crate) report: Option<PathBuf>,
+    pub(crate) out: OutputPlan,
+}
+
+impl FitPlan {
+    pub(crate) fn new(args: &FitArgs) -> Result<FitPlan, Refusal> {
+        let positive = |flag: &str, text: Option<&str>, zero: bool| {
+            let judge = |t: &str| match t.parse::<f64>() {
+                Ok(x) if x.is_finite() && (x > 0.0 || (zero && x == 0.0)) => Ok(x),
+                _ => Err(format!("{flag} {t}: a positive number is needed")),
+            };
+            text.map(judge).transpose()
+        };
+        let spans =
+            args.spans.as_deref().map(|t| t.parse().map_err(|_| format!("--spans {t}: a whole number is needed")));
+        if args.tolerance.is_some() && !args.fair {
+            return Err(Refusal::new("--tolerance goes with --fair"));
+        }
+        Ok(FitPlan {
+            data: args.data.clone(),
+            weight: positive("--weight", args.weight.as_deref(), false)?,
+            stiffening: positive("--stiffening", args.stiffening.as_deref(), true)?,
+            spans: spans.transpose()?,
+            fair: args.fair,
+            tolerance: positive("--tolerance", args.tolerance.as_deref(), false)?,
+            report: args.report.clone(),
+            out: OutputPlan::new(&args.out, &[&args.data], args.report.as_deref())?,
+        })
     }
 }

@@ -2,6 +2,7 @@
 
 pub(crate) mod design;
 pub(crate) mod edit;
+pub(crate) mod fit;
 pub(crate) mod info;
 pub(crate) mod light;
 pub(crate) mod probe;

@@ -2,6 +2,7 @@
 
 mod design;
 mod edit;
+mod fit;
 mod light;
 mod probe;
 mod program;
