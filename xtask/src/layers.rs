@@ -31,7 +31,7 @@ const OURS: [(&str, &[&str]); 9] = [
 ];
 
 /// Foreign crates that only some of ours may use, and why.
-const OWNED: [(&str, &[&str], &str); 17] = [
+const OWNED: [(&str, &[&str], &str); 19] = [
     ("rayon", &["ondelette-numerics"], "results must not depend on the number of threads"),
     ("clap", &["ondelette"], "libraries know no command line"),
     ("ctrlc", &["ondelette"], "libraries know no signals"),

@@ -6,6 +6,7 @@ use crate::plan::values;
 use crate::progress::Progress;
 use ondelette_io::onl::read_solution;
 use ondelette_numerics::par;
+use ondelette_radiosity::probe::Prober;
 use ondelette_radiosity::{Scene, Solution};
 use ondelette_verify::{Group, Report, Verdict, Verifier};
 use serde_json::json;
@@ -79,7 +80,8 @@ fn verify(args: &VerifyArgs, stop: Stop) -> Result<Outcome, Refusal> {
         .map_err(|e| Refusal::new(format!("{}: {e}", args.solution.display())))?;
     let mut progress = Progress::new(promised);
     let mut stopped = None;
-    while stopped.is_none() && verifier.step(|side, at| solution.irradiance(side, at)) {
+    let prober = Prober::new(&solution);
+    while stopped.is_none() && verifier.step(|side, at| prober.irradiance(side, at)) {
         let (done, all) = verifier.progress();
         progress.stage(&format!("tracing paths, {done} of {all} points"), done as f64 / all as f64);
         stopped = stop.asked();

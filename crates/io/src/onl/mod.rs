@@ -27,7 +27,7 @@ pub use solution::{read_solution, solution_bytes, solution_of, write_solution};
 pub use write::ChunkWriter;
 
 /// Version of the format that this program writes and reads.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 
 const MAGIC: &[u8; 16] = b"ONDELETTE\r\n\x1a\n\0\0\0";
 const HEADER: usize = 64;
@@ -117,9 +117,9 @@ mod tests {
         assert!(message(text_mode).contains("not an Ondelette solution"));
 
         let mut future = good.clone();
-        future[16] = 2;
+        future[16] = 3;
         let said = message(future);
-        assert!(said.contains("version 2") && said.contains("reads version 1"), "{said}");
+        assert!(said.contains("version 3") && said.contains("reads version 2"), "{said}");
 
         let said = message(good[..good.len() - 1].to_vec());
         assert!(said.contains("cut short") && said.contains(&good.len().to_string()), "{said}");
