@@ -50,6 +50,8 @@ const OWNED: [(&str, &[&str], &str); 19] = [
         &["ondelette-radiosity", "ondelette-verify", "ondelette-io", "ondelette"],
         "bases and links know no space",
     ),
+    ("faer", &["ondelette-modeling"], "sparse factorisation is the business of shape"),
+    ("rustfft", &["ondelette-modeling"], "spectral solutions are the business of shape"),
     ("tracing", &[], "libraries neither print nor log: engines return events"),
     ("log", &[], "libraries neither print nor log: engines return events"),
     ("anyhow", &["xtask"], "errors say what, where, the limit and what to do: an enum beside its function"),
