@@ -29,8 +29,8 @@ fn a_kept_promise_is_found_kept_and_a_tighter_one_broken() {
     // nothing is written, and the same is said again, by any number of threads
     assert_eq!(place.names(), before);
     assert_eq!(place.run("verify room.onl --threads 1").with_code(0).out, kept.out);
-    let broken = place.run("verify room.onl --error 0.2% --points 400").with_code(1);
-    assert!(broken.out.contains("\nbroken: ") && broken.out.contains("promised   0.200 %"), "{}", broken.out);
+    let broken = place.run("verify room.onl --error 0.02% --points 400").with_code(1);
+    assert!(broken.out.contains("\nbroken: ") && broken.out.contains("promised   0.020 %"), "{}", broken.out);
 }
 
 #[test]
