@@ -95,6 +95,11 @@ impl Gather {
         }
     }
 
+    /// Whether none of its points is inside of something.
+    pub(super) fn is_whole(&self) -> bool {
+        self.lit.iter().all(|l| *l)
+    }
+
     /// Points.
     pub(super) fn points(&self) -> u32 {
         self.points.len() as u32

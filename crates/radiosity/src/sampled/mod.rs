@@ -13,6 +13,7 @@ mod direct;
 mod gather;
 mod lamps;
 mod plan;
+mod stitch;
 
 use crate::kernel::LightKernel;
 use crate::rgb::Rgb;

@@ -5,7 +5,7 @@
 //! product of both halves' misses, which is free of scatter on average).
 
 use super::gather::{Draw, Field, Gather};
-use super::{Phase, Sampled};
+use super::{Phase, Sampled, stitch};
 use crate::solver::Event;
 use ondelette_compress::NodeId;
 use ondelette_numerics::par;
@@ -70,8 +70,10 @@ impl Sampled {
             self.indirect[k * stride..(k + 1) * stride].copy_from_slice(&out);
         }
         self.statistics.iterations += 1;
+        let whole = |gather: &Gather| gather.is_whole();
+        let smooth = stitch::stitched(&self.forest, &self.gathers, &self.indirect, whole);
         let mut irradiance = self.direct_light();
-        self.add_indirect(&self.indirect, &mut irradiance);
+        self.add_indirect(&smooth, &mut irradiance);
         self.irradiance = irradiance;
         self.whole = self.integral(&self.irradiance);
         let errors = self.errors();

@@ -1,0 +1,87 @@
+//! Neighbouring elements agree at their corners.
+//!
+//! Every gathering element is fitted by itself, so its scatter shows as a facet. At a corner the functions of all
+//! elements of the side that meet there are averaged, and an element takes the bilinear function of its four corners:
+//! the scatter of neighbours cancels, and the facets are gone. What the field itself does between corners is below the
+//! scatter, or the element would have been split.
+
+use super::gather::{Gather, MOST};
+use ondelette_compress::{Forest, NodeId};
+use ondelette_wavelet::cell::CellShape;
+
+/// How far to either side of a corner its neighbours are looked for, in units of the element.
+const BESIDE: f64 = 1e-6;
+
+/// The same field with its corners averaged: coefficients in the order of `gathers`. Parallelograms with bases of the
+/// second order only; others, and elements partly inside of something, are left as they are.
+pub(super) fn stitched(
+    forest: &Forest,
+    gathers: &[Gather],
+    coefficients: &[[f64; 3]],
+    whole: impl Fn(&Gather) -> bool,
+) -> Vec<[f64; 3]> {
+    let stride = forest.stride();
+    let mut of_node = vec![u32::MAX; forest.len()];
+    gathers.iter().enumerate().for_each(|(k, gather)| of_node[gather.node.index()] = k as u32);
+    let basis = forest.basis(CellShape::Square);
+    let mut out = coefficients.to_vec();
+    if !basis.is_nested() || basis.order() != 2 {
+        return out;
+    }
+    // the gather over a point of a side, and the value of its function there
+    let value = |side: u32, at: [f64; 2]| -> Option<[f64; 3]> {
+        let mut id = forest.roots()[side as usize];
+        let mut x = at;
+        while of_node[id.index()] == u32::MAX {
+            if forest.is_leaf(id) {
+                return None;
+            }
+            let (c, local) = CellShape::Square.descend(x);
+            (id, x) = (forest.child(id, c), local);
+        }
+        let k = of_node[id.index()] as usize;
+        if !whole(&gathers[k]) {
+            return None;
+        }
+        let mut functions = [0.0; MOST];
+        basis.eval(x, &mut functions);
+        let own = &coefficients[k * stride..k * stride + basis.len()];
+        Some(own.iter().zip(&functions).fold([0.0; 3], |sum, (c, f)| std::array::from_fn(|i| sum[i] + c[i] * f)))
+    };
+    let analysis = basis.analysis(2);
+    for (k, gather) in gathers.iter().enumerate() {
+        let cell = &forest.node(NodeId(gather.node.0)).cell;
+        if cell.shape != CellShape::Square || !whole(gather) {
+            continue;
+        }
+        let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]].map(|corner| {
+            let (mut sum, mut count) = ([0.0; 3], 0.0);
+            for [s, t] in [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]] {
+                let at = cell.to_root([corner[0] + s * BESIDE, corner[1] + t * BESIDE]);
+                if at.iter().all(|x| (0.0..=1.0).contains(x))
+                    && let Some(v) = value(cell.root, at)
+                {
+                    (0..3).for_each(|c| sum[c] += v[c]);
+                    count += 1.0;
+                }
+            }
+            sum.map(|v| v / f64::max(count, 1.0))
+        });
+        let samples = |c: usize| -> Vec<f64> {
+            let bilinear = |x: &[f64; 2]| {
+                let [s, t] = *x;
+                (1.0 - s) * (1.0 - t) * corners[0][c]
+                    + s * (1.0 - t) * corners[1][c]
+                    + (1.0 - s) * t * corners[2][c]
+                    + s * t * corners[3][c]
+            };
+            analysis.points.iter().map(bilinear).collect()
+        };
+        for c in 0..3 {
+            for (slot, v) in analysis.coefficients(&samples(c)).into_iter().enumerate() {
+                out[k * stride + slot][c] = v;
+            }
+        }
+    }
+    out
+}
