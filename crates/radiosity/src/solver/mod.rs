@@ -1,8 +1,8 @@
 //! From a scene to its light, step by step.
 //!
 //! A resumable state machine: every [`Solver::step`] does a bounded piece of work and says what it did. Stop stepping
-//! to pause or cancel; [`Solver::solution`] is valid after any step. Two engines stand behind it: [`mod@linked`] joins
-//! pairs of elements by wavelet links, [`crate::sampled`] samples the rows of the operator.
+//! to pause or cancel; [`Solver::solution`] is valid after any step. Two engines stand behind it: `linked` joins
+//! pairs of elements by wavelet links, `sampled` samples the rows of the operator.
 
 mod linked;
 
