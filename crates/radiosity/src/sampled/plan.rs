@@ -70,8 +70,7 @@ impl Sampled {
             self.indirect[k * stride..(k + 1) * stride].copy_from_slice(&out);
         }
         self.statistics.iterations += 1;
-        let whole = |gather: &Gather| gather.is_whole();
-        let smooth = stitch::stitched(&self.forest, &self.gathers, &self.indirect, whole);
+        let smooth = stitch::stitched(&self.forest, &self.gathers, &self.indirect, |k| self.verdicts[k].noise);
         let mut irradiance = self.direct_light();
         self.add_indirect(&smooth, &mut irradiance);
         self.irradiance = irradiance;

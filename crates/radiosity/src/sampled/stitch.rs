@@ -2,7 +2,8 @@
 //!
 //! Every gathering element is fitted by itself, so its scatter shows as a facet. At a corner the functions of all
 //! elements of the side that meet there are averaged, and an element takes the bilinear function of its four corners:
-//! the scatter of neighbours cancels, and the facets are gone. What the field itself does between corners is below the
+//! the scatter of neighbours cancels, and the facets are gone. Neighbours that differ by more than their scatter have
+//! an edge of the light between them and are left alone. What the field itself does between corners is below the
 //! scatter, or the element would have been split.
 
 use super::gather::{Gather, MOST};
@@ -12,14 +13,18 @@ use ondelette_wavelet::cell::CellShape;
 /// How far to either side of a corner its neighbours are looked for, in units of the element.
 const BESIDE: f64 = 1e-6;
 
+/// Differences up to this many times the noise at both elements' points are scatter; others are edges of the light.
+const ALIKE: f64 = 3.0;
+
 /// The same field with its corners averaged: coefficients in the order of `gathers`. Parallelograms with bases of the
 /// second order only; others, and elements partly inside of something, are left as they are.
 pub(super) fn stitched(
     forest: &Forest,
     gathers: &[Gather],
     coefficients: &[[f64; 3]],
-    whole: impl Fn(&Gather) -> bool,
+    noise: impl Fn(usize) -> f64,
 ) -> Vec<[f64; 3]> {
+    let whole = |gather: &Gather| gather.is_whole();
     let stride = forest.stride();
     let mut of_node = vec![u32::MAX; forest.len()];
     gathers.iter().enumerate().for_each(|(k, gather)| of_node[gather.node.index()] = k as u32);
@@ -29,7 +34,7 @@ pub(super) fn stitched(
         return out;
     }
     // the gather over a point of a side, and the value of its function there
-    let value = |side: u32, at: [f64; 2]| -> Option<[f64; 3]> {
+    let value = |side: u32, at: [f64; 2]| -> Option<(usize, [f64; 3])> {
         let mut id = forest.roots()[side as usize];
         let mut x = at;
         while of_node[id.index()] == u32::MAX {
@@ -46,7 +51,8 @@ pub(super) fn stitched(
         let mut functions = [0.0; MOST];
         basis.eval(x, &mut functions);
         let own = &coefficients[k * stride..k * stride + basis.len()];
-        Some(own.iter().zip(&functions).fold([0.0; 3], |sum, (c, f)| std::array::from_fn(|i| sum[i] + c[i] * f)))
+        let sum = |sum: [f64; 3], (c, f): (&[f64; 3], &f64)| std::array::from_fn(|i| sum[i] + c[i] * f);
+        Some((k, own.iter().zip(&functions).fold([0.0; 3], sum)))
     };
     let analysis = basis.analysis(2);
     for (k, gather) in gathers.iter().enumerate() {
@@ -55,17 +61,21 @@ pub(super) fn stitched(
             continue;
         }
         let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]].map(|corner| {
-            let (mut sum, mut count) = ([0.0; 3], 0.0);
+            let inside = cell.to_root(corner.map(|x| BESIDE + x * (1.0 - 2.0 * BESIDE)));
+            let (_, own) = value(cell.root, inside).unwrap_or_default();
+            let (mut sum, mut count) = (own, 1.0);
             for [s, t] in [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]] {
                 let at = cell.to_root([corner[0] + s * BESIDE, corner[1] + t * BESIDE]);
                 if at.iter().all(|x| (0.0..=1.0).contains(x))
-                    && let Some(v) = value(cell.root, at)
+                    && let Some((other, v)) = value(cell.root, at)
+                    && other != k
+                    && (0..3).map(|c| (v[c] - own[c]).abs()).sum::<f64>() <= ALIKE * (noise(k) + noise(other))
                 {
                     (0..3).for_each(|c| sum[c] += v[c]);
                     count += 1.0;
                 }
             }
-            sum.map(|v| v / f64::max(count, 1.0))
+            sum.map(|v| v / count)
         });
         let samples = |c: usize| -> Vec<f64> {
             let bilinear = |x: &[f64; 2]| {
