@@ -28,7 +28,6 @@ pub mod cell;
 mod coefficient;
 mod cubic;
 mod decomposition;
-mod dense;
 pub mod exact;
 mod extension;
 mod family;

@@ -1,11 +1,11 @@
 //! Between samples of a function and the finest coefficients of a pyramid: the prefilter and its inverse.
 
 use crate::coefficient::Scalar;
-use crate::dense::inverse;
 use crate::family::{Boundary, Family, SplineFamily};
 use crate::pyramid::Pyramid;
 use crate::space::{Cyclic, SpaceError, SplineSpace};
 use crate::tree::TreeFamily;
+use ondelette_numerics::dense::inverse;
 
 /// Prefilter of one axis.
 ///

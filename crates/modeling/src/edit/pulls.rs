@@ -8,6 +8,7 @@ use super::orientation::Orientation;
 use crate::axis::Axis;
 use crate::basis;
 use crate::shape::{Curve, Surface};
+use crate::system::sparse_dot;
 use ondelette_wavelet::{Kind, energy_diagonals, gram};
 
 /// One wish: the shape, or a derivative of it, at a parameter.
@@ -87,22 +88,6 @@ fn applied(row: &Factors, width: usize, points: &[[f64; 3]]) -> [f64; 3] {
     out
 }
 
-fn inner(a: &[(usize, f64)], b: &[(usize, f64)]) -> f64 {
-    let (mut i, mut j, mut sum) = (0, 0, 0.0);
-    while i < a.len() && j < b.len() {
-        match a[i].0.cmp(&b[j].0) {
-            std::cmp::Ordering::Less => i += 1,
-            std::cmp::Ordering::Greater => j += 1,
-            std::cmp::Ordering::Equal => {
-                sum += a[i].1 * b[j].1;
-                i += 1;
-                j += 1;
-            }
-        }
-    }
-    sum
-}
-
 /// Minimum-norm change with A change = target - now, coordinate by coordinate; `apply(i, j, coordinate, change)`.
 fn solve(
     rows: &[Factors],
@@ -119,7 +104,7 @@ fn solve(
             continue;
         }
         let at = factors.iter().position(|f| f.0 == used).unwrap_or_else(|| {
-            let gram = |a: usize, b: usize| inner(&rows[a][0], &rows[b][0]) * inner(&rows[a][1], &rows[b][1]);
+            let gram = |a: usize, b: usize| sparse_dot(&rows[a][0], &rows[b][0]) * sparse_dot(&rows[a][1], &rows[b][1]);
             factors.push((used.clone(), Pivoted::new(&used, gram)));
             factors.len() - 1
         });

@@ -96,7 +96,8 @@ fn within(piece: &[usize], rows: &[Row], n: usize, local: &dyn Fn(usize) -> usiz
     }
 }
 
-fn sparse_dot(a: &[(usize, f64)], b: &[(usize, f64)]) -> f64 {
+/// Scalar product of two sparse vectors, sorted by index.
+pub(crate) fn sparse_dot(a: &[(usize, f64)], b: &[(usize, f64)]) -> f64 {
     let (mut i, mut j, mut sum) = (0, 0, 0.0);
     while i < a.len() && j < b.len() {
         match a[i].0.cmp(&b[j].0) {

@@ -8,6 +8,7 @@ mod dependence;
 mod space;
 
 pub(crate) use block::{Block, Structure};
+pub(crate) use dependence::sparse_dot;
 pub use space::Space;
 
 use crate::constraint::{Constraint, ConstraintError};

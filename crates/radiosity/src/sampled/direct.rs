@@ -8,7 +8,7 @@ use crate::kernel::LightKernel;
 use crate::rgb::Rgb;
 use crate::visible::View;
 use ondelette_compress::{Cell, Forest};
-use ondelette_numerics::seed;
+use ondelette_numerics::{dense, seed};
 use ondelette_wavelet::cell::{CellBasis, CellShape};
 
 /// Direct light of one element.
@@ -70,7 +70,7 @@ impl Grid {
                 }
             }
         }
-        let inverse = super::gather::inverse(gram, n);
+        let inverse = dense::inverse(&gram, n);
         let mut matrix = vec![0.0; n * points.len()];
         for i in 0..n {
             for (q, row) in values.chunks(n).enumerate() {
@@ -100,7 +100,7 @@ impl Grid {
         let one: Vec<f64> = self.matrix.chunks(count).map(|row| row.iter().sum()).collect();
         let constant: Vec<f64> = (0..n).map(|i| (0..n).map(|j| gram[i * n + j] * one[j]).sum()).collect();
         (0..n).for_each(|i| gram[i * n + i] += 1e-4);
-        let inverse = super::gather::inverse(gram, n);
+        let inverse = dense::inverse(&gram, n);
         let mut matrix = vec![0.0; n * count];
         for i in 0..n {
             let inverse = &inverse[i * n..(i + 1) * n];

@@ -9,7 +9,7 @@
 use super::lamps::on_cell;
 use crate::kernel::LightKernel;
 use ondelette_compress::{Forest, NodeId};
-use ondelette_numerics::{seed, sobol};
+use ondelette_numerics::{dense, seed, sobol};
 use ondelette_wavelet::cell::{CellBasis, CellShape};
 use std::ops::Range;
 
@@ -123,7 +123,7 @@ impl Gather {
     }
 
     /// Chooses the functions to fit: at most what the points determine.
-    pub(super) fn prepare(&mut self, basis: &CellBasis, most: usize) {
+    pub(super) fn prepare(&mut self, basis: &CellBasis) {
         // points that see only backs are inside of something: dark, and no part of the fit
         self.lit = vec![false; self.points.len()];
         for ray in self.first.iter().chain(&self.others).flatten() {
@@ -136,7 +136,7 @@ impl Gather {
             return;
         }
         self.order = if basis.is_nested() {
-            (1..=most.min(basis.order())).rev().find(|&p| basis.truncated(p).len() <= points).unwrap_or(1)
+            (1..=basis.order()).rev().find(|&p| basis.truncated(p).len() <= points).unwrap_or(1)
         } else {
             basis.order()
         };
@@ -163,7 +163,7 @@ impl Gather {
         let one = |i: usize| if !basis.is_nested() || i == 0 { 1.0 } else { 0.0 };
         let constant: Vec<f64> = (0..n).map(|i| (0..n).map(|j| gram[i * n + j] * one(j)).sum()).collect();
         (0..n).for_each(|i| gram[i * n + i] += 1e-4);
-        let inverse = inverse(gram, n);
+        let inverse = dense::inverse(&gram, n);
         self.fit.clear();
         for i in 0..n {
             let row = &inverse[i * n..(i + 1) * n];
@@ -402,29 +402,6 @@ fn relocate(forest: &Forest, rays: &mut [Ray]) {
             (ray.leaf, ray.to) = (id.0, x.map(|x| x as f32));
         }
     }
-}
-
-/// Inverse of a symmetric positive definite matrix, by Gauss and Jordan.
-pub(super) fn inverse(mut a: Vec<f64>, n: usize) -> Vec<f64> {
-    let mut b = vec![0.0; n * n];
-    (0..n).for_each(|i| b[i * n + i] = 1.0);
-    for k in 0..n {
-        let pivot = 1.0 / a[k * n + k];
-        for j in 0..n {
-            a[k * n + j] *= pivot;
-            b[k * n + j] *= pivot;
-        }
-        for i in 0..n {
-            let factor = a[i * n + k];
-            if i != k && factor != 0.0 {
-                for j in 0..n {
-                    a[i * n + j] -= factor * a[k * n + j];
-                    b[i * n + j] -= factor * b[k * n + j];
-                }
-            }
-        }
-    }
-    b
 }
 
 /// A radiosity at the leaves, in the form in which rays read it fastest.

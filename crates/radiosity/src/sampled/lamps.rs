@@ -16,8 +16,6 @@ use ondelette_wavelet::cell::CellShape;
 pub(super) const MOST_LAMPS: usize = 4096;
 /// Blockers up to which the visible part of a lamp is cut out exactly; beyond, rays decide.
 const MOST_BLOCKERS: usize = 24;
-/// Blockers that are always cheap enough to cut out.
-const FEW_BLOCKERS: usize = 4;
 /// Share of a lamp below which its visible part counts as a crack.
 const SLIVER: f64 = 2e-6;
 /// Share of an element's light from which a lamp is worth a look at what stands before it.
@@ -173,10 +171,9 @@ impl Lamps {
             if patches.iter().any(|&p| kernel.occluders().hides(p, a, b)) {
                 continue;
             }
-            let exact = patches.len() <= FEW_BLOCKERS || (patches.len() <= MOST_BLOCKERS && 4.0 * share > WORTHY);
             let between = match patches.len() {
                 0 => Between::Nothing,
-                _ if exact => Between::Patches(patches),
+                1..=MOST_BLOCKERS => Between::Patches(patches),
                 _ => many,
             };
             seen.push(Sight { lamp: k as u32, between });

@@ -283,7 +283,7 @@ impl Sampled {
         par::for_each_chunk(&mut self.gathers, 16, |_, gathers| {
             for gather in gathers {
                 gather.relocate(forest);
-                gather.prepare(forest.basis_of(gather.node), usize::MAX);
+                gather.prepare(forest.basis_of(gather.node));
             }
         });
     }

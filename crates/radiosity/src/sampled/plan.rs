@@ -42,21 +42,12 @@ const PATIENT_ROUNDS: u32 = 3;
 /// Rounds after which nothing more is hoped for.
 const MOST_ROUNDS: u32 = 40;
 
-/// The errors, as integrals over counted sides, channels summed.
-#[derive(Clone, Copy, Debug, Default)]
-struct Errors {
-    direct: f64,
-    faint: f64,
-    scatter: f64,
-    misfit: f64,
-    together: f64,
-}
-
 impl Sampled {
     /// Gathers with all samples, estimates the error, and plans what comes next.
     pub(super) fn judge(&mut self, unsolved: f64) -> Event {
         let stride = self.forest.stride();
-        let mut values = self.direct_light();
+        let mut irradiance = self.direct_light();
+        let mut values = irradiance.clone();
         self.add_indirect(&self.indirect, &mut values);
         self.reflect(&mut values, true);
         let field = Field::new(&self.forest, &values);
@@ -71,12 +62,10 @@ impl Sampled {
         }
         self.statistics.iterations += 1;
         let smooth = stitch::stitched(&self.forest, &self.gathers, &self.indirect, |k| self.verdicts[k].noise);
-        let mut irradiance = self.direct_light();
         self.add_indirect(&smooth, &mut irradiance);
         self.irradiance = irradiance;
         self.whole = self.integral(&self.irradiance);
-        let errors = self.errors();
-        self.error = if self.whole > 0.0 { SAFETY * errors.together / self.whole + unsolved } else { 0.0 };
+        self.error = if self.whole > 0.0 { SAFETY * self.missed() / self.whole + unsolved } else { 0.0 };
         self.rounds += 1;
         self.refitted = false;
         let event = Event::Solved { error: self.error, links: 0, elements: self.forest.leaves() };
@@ -94,18 +83,16 @@ impl Sampled {
         event
     }
 
-    fn errors(&self) -> Errors {
-        let mut errors = Errors::default();
+    /// All three errors together, as an integral over counted sides, channels summed: where they are independent of one
+    /// another their squares add up.
+    fn missed(&self) -> f64 {
         let mut local = vec![0.0; self.forest.len()];
         for (gather, verdict) in self.gathers.iter().zip(&self.verdicts) {
             let node = self.forest.node(gather.node);
             if self.counts(node.cell.root) {
-                let scatter = MEAN_OF_SCATTER * verdict.scatter;
-                local[gather.node.index()] = scatter;
-                errors.scatter += node.measure * scatter;
+                local[gather.node.index()] = MEAN_OF_SCATTER * verdict.scatter;
             }
         }
-        errors.misfit = self.misfit_of_gathers();
         let mut together = 0.0;
         for (n, node) in self.forest.nodes().iter().enumerate() {
             if !self.counts(node.cell.root) {
@@ -118,14 +105,11 @@ impl Sampled {
             } else {
                 let direct = f64::from(self.misfit[n]);
                 let area = node.measure * f64::from(self.lit[n]);
-                errors.direct += area * direct;
                 let scatter = MEAN_OF_SCATTER * f64::from(self.scatter[n]);
-                errors.faint += area * scatter;
                 together += area * direct.hypot(local[n].hypot(scatter));
             }
         }
-        errors.together = together.hypot(errors.misfit);
-        errors
+        together.hypot(self.misfit_of_gathers())
     }
 
     /// Integral of what the gathering elements' functions cannot say: roots of estimated squares, less what scatter

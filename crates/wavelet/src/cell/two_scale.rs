@@ -2,7 +2,7 @@
 
 use super::basis::{CellBasis, CellFamily};
 use super::shape::CellShape;
-use crate::dense::inverse;
+use ondelette_numerics::dense::inverse;
 
 impl CellBasis {
     /// A pulled coefficient is the mean of the function times the staircase of height n T_c\[i\]\[k\] on box k of child

@@ -1,7 +1,7 @@
 //! Small dense matrices.
 
 /// Inverse of a small regular matrix, row-major `n x n`, by Gauss-Jordan elimination with row pivots. O(n^3).
-pub(crate) fn inverse(matrix: &[f64], n: usize) -> Vec<f64> {
+pub fn inverse(matrix: &[f64], n: usize) -> Vec<f64> {
     let mut a = matrix.to_vec();
     let mut out: Vec<f64> = (0..n * n).map(|i| if i / n == i % n { 1.0 } else { 0.0 }).collect();
     for c in 0..n {
