@@ -161,3 +161,13 @@ fn no_unit_of_length_is_better_than_another() {
         assert!((scaled(k) / one - 1.0).abs() < 1e-6, "scale {k}: {} against {one}", scaled(k));
     }
 }
+
+#[test]
+fn every_basis_lights_a_room() {
+    // high orders must converge with few points, and flatlets must stand a floor under a box
+    for basis in ["m1", "m3", "m4", "m5", "m6", "f2", "f3", "f4"] {
+        let scene = samples::quads("box", &room_with_box(0.0));
+        let mean = solve(scene, basis, 0.1).mean_irradiance(1).0[0];
+        assert!((mean / 0.317 - 1.0).abs() < 0.1, "{basis}: {mean}");
+    }
+}

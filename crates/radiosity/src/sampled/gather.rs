@@ -131,12 +131,14 @@ impl Gather {
         }
         let points = self.lit.iter().filter(|l| **l).count();
         if points == 0 {
-            self.order = 1;
-            self.fit = vec![0.0; self.points.len()];
+            self.order = if basis.is_nested() { 1 } else { basis.order() };
+            self.fit = vec![0.0; basis.truncated(self.order).len() * self.points.len()];
             return;
         }
         self.order = if basis.is_nested() {
-            (1..=basis.order()).rev().find(|&p| basis.truncated(p).len() <= points).unwrap_or(1)
+            // high orders through as many points would swing between them, and the balance would not converge
+            let fits = |p: usize| basis.truncated(p).len() * if p > 2 { 2 } else { 1 } <= points;
+            (1..=basis.order()).rev().find(|&p| fits(p)).unwrap_or(1)
         } else {
             basis.order()
         };
