@@ -265,8 +265,9 @@ impl Gather {
         }
     }
 
-    /// What all samples gather, as coefficients, and what they say of themselves.
-    pub(super) fn judge(&self, radiosity: &Field<'_>, out: &mut [[f64; 3]]) -> Verdict {
+    /// What all samples gather, as coefficients: the mean of the halves, half their difference, and what they say of
+    /// themselves.
+    pub(super) fn judge(&self, radiosity: &Field<'_>, out: &mut [[f64; 3]], apart: &mut [[f64; 3]]) -> Verdict {
         let basis = radiosity.forest.basis_of(self.node);
         let n = basis.len();
         let points = self.points.len();
@@ -277,15 +278,12 @@ impl Gather {
             self.values(radiosity, half, true, own);
             self.add_fit(basis, own, 1.0, &mut fits[half][..n]);
         }
-        let mut square = [0.0; 3];
         for i in 0..n {
             for c in 0..3 {
                 out[i][c] = 0.5 * (fits[0][i][c] + fits[1][i][c]);
-                square[c] += (0.5 * (fits[0][i][c] - fits[1][i][c])).powi(2);
+                apart[i][c] = 0.5 * (fits[0][i][c] - fits[1][i][c]);
             }
         }
-        let scale = if basis.is_nested() { 1.0 } else { 1.0 / n as f64 };
-        let scatter = square.iter().map(|s| (s * scale).sqrt()).sum();
         let mut noise = [0.0; 3];
         let mut misfit = 0.0;
         let mut functions = [0.0; MOST];
@@ -312,15 +310,25 @@ impl Gather {
         let noise: f64 = noise.iter().map(|s| (s / points.max(1) as f64).sqrt()).sum();
         // the product of two scattered numbers, the mean of `left` of them
         let certainty = 2.0 * noise * noise / (left.max(1) as f64).sqrt();
-        Verdict { scatter, noise, misfit, certainty, share: (used as f64 / points.max(1) as f64).sqrt() }
+        Verdict { scatter: 0.0, noise, misfit, certainty, share: (used as f64 / points.max(1) as f64).sqrt() }
     }
+}
+
+/// Root mean square over an element of the function with these coefficients, channels summed.
+pub(super) fn size_of(basis: &CellBasis, coefficients: &[[f64; 3]]) -> f64 {
+    let mut square = [0.0; 3];
+    for own in &coefficients[..basis.len()] {
+        (0..3).for_each(|c| square[c] += own[c] * own[c]);
+    }
+    let scale = if basis.is_nested() { 1.0 } else { 1.0 / basis.len() as f64 };
+    square.iter().map(|s| (s * scale).sqrt()).sum()
 }
 
 /// What the samples of an element say of themselves.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Verdict {
-    /// Root mean square over the element of half the difference of the halves' fits, channels summed: the scatter of
-    /// their mean.
+    /// Root mean square over the element of half the difference of the halves, channels summed: the scatter of their
+    /// mean.
     pub(super) scatter: f64,
     /// The same at the points, before the fit.
     pub(super) noise: f64,

@@ -18,8 +18,10 @@ pub(super) const MOST_LAMPS: usize = 4096;
 const MOST_BLOCKERS: usize = 24;
 /// Share of a lamp below which its visible part counts as a crack.
 const SLIVER: f64 = 2e-6;
-/// Share of an element's light from which a lamp is worth a look at what stands before it.
-const WORTHY: f64 = 0.04;
+/// Share of an element's light from which a lamp is worth a look at what stands before it: in units of the promised
+/// error, and its limits.
+const WORTHY: f64 = 3.0;
+const WORTHY_LIMITS: [f64; 2] = [0.04, 0.15];
 
 /// One emitting side.
 #[derive(Clone, Debug)]
@@ -45,6 +47,8 @@ pub(super) struct Lamps {
     pub(super) groups: Vec<(u32, Rgb)>,
     /// Whether a side is a lamp (else its emission is met by rays).
     is_lamp: Vec<bool>,
+    /// Share of an element's light from which a lamp is worth a look at what stands before it.
+    worthy: f64,
 }
 
 /// What stands between an element and a lamp.
@@ -73,8 +77,8 @@ impl Sight {
 }
 
 impl Lamps {
-    /// The emitters of a scene.
-    pub(super) fn of(scene: &Scene, kernel: &LightKernel) -> Self {
+    /// The emitters of a scene; `error` is promised.
+    pub(super) fn of(scene: &Scene, kernel: &LightKernel, error: f64) -> Self {
         let mut groups: Vec<(u32, Rgb)> = Vec::new();
         let mut lamps = Vec::new();
         for (side, frame) in scene.sides.iter().enumerate() {
@@ -108,7 +112,8 @@ impl Lamps {
         lamps.truncate(MOST_LAMPS);
         let mut is_lamp = vec![false; scene.sides.len()];
         lamps.iter().for_each(|l| is_lamp[l.side] = true);
-        Lamps { lamps, groups, is_lamp }
+        let worthy = (WORTHY * error).clamp(WORTHY_LIMITS[0], WORTHY_LIMITS[1]);
+        Lamps { lamps, groups, is_lamp, worthy }
     }
 
     /// Number of lamps.
@@ -161,7 +166,7 @@ impl Lamps {
             let share = potential / whole;
             let lamp = &self.lamps[k];
             let many = Between::Many(rays * share);
-            if share < WORTHY {
+            if share < self.worthy {
                 seen.push(Sight { lamp: k as u32, between: many });
                 continue;
             }

@@ -102,7 +102,7 @@ pub(crate) struct Sampled {
 impl Sampled {
     pub(crate) fn new(scene: Scene, settings: Settings) -> Result<Self, SolveError> {
         let kernel = LightKernel::new(&scene);
-        let lamps = Lamps::of(&scene, &kernel);
+        let lamps = Lamps::of(&scene, &kernel, settings.error);
         let mut forest = Forest::new(settings.basis.family(), usize::from(settings.basis.order))
             .expect("a parsed basis has a valid order");
         let mut area = 0.0;

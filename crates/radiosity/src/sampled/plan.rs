@@ -4,7 +4,7 @@
 //! (half the difference of two independent halves), and what the functions of the gathering elements cannot say (the
 //! product of both halves' misses, which is free of scatter on average).
 
-use super::gather::{Draw, Field, Gather};
+use super::gather::{self, Draw, Field, Gather};
 use super::{Phase, Sampled, stitch};
 use crate::solver::Event;
 use ondelette_compress::NodeId;
@@ -52,16 +52,23 @@ impl Sampled {
         self.reflect(&mut values, true);
         let field = Field::new(&self.forest, &values);
         let judged = par::map(self.gathers.len(), |k| {
-            let mut out = vec![[0.0; 3]; stride];
-            let verdict = self.gathers[k].judge(&field, &mut out);
-            (verdict, out)
+            let (mut out, mut apart) = (vec![[0.0; 3]; stride], vec![[0.0; 3]; stride]);
+            let verdict = self.gathers[k].judge(&field, &mut out, &mut apart);
+            (verdict, out, apart)
         });
-        for (k, (verdict, out)) in judged.into_iter().enumerate() {
+        let mut apart = vec![[0.0; 3]; self.indirect.len()];
+        for (k, (verdict, out, half)) in judged.into_iter().enumerate() {
             self.verdicts[k] = verdict;
             self.indirect[k * stride..(k + 1) * stride].copy_from_slice(&out);
+            apart[k * stride..(k + 1) * stride].copy_from_slice(&half);
         }
         self.statistics.iterations += 1;
-        let smooth = stitch::stitched(&self.forest, &self.gathers, &self.indirect, |k| self.verdicts[k].noise);
+        let noise = |k: usize| self.verdicts[k].noise;
+        let [smooth, apart] = stitch::stitched(&self.forest, &self.gathers, [&self.indirect, &apart], noise);
+        for (k, verdict) in self.verdicts.iter_mut().enumerate() {
+            let basis = self.forest.basis_of(self.gathers[k].node);
+            verdict.scatter = gather::size_of(basis, &apart[k * stride..]);
+        }
         self.add_indirect(&smooth, &mut irradiance);
         self.irradiance = irradiance;
         self.whole = self.integral(&self.irradiance);

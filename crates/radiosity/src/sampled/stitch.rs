@@ -16,25 +16,29 @@ const BESIDE: f64 = 1e-6;
 /// Differences up to this many times the noise at both elements' points are scatter; others are edges of the light.
 const ALIKE: f64 = 3.0;
 
-/// The same field with its corners averaged: coefficients in the order of `gathers`. Parallelograms with bases of the
-/// second order only; others, and elements partly inside of something, are left as they are.
+/// Values of a field and of half the difference of its halves, by channel.
+type Values = [[f64; 3]; 2];
+
+/// The same field with its corners averaged: coefficients in the order of `gathers`; and half the difference of its
+/// halves, treated alike. Parallelograms with bases of the second order only; others, and elements partly inside of
+/// something, are left as they are.
 pub(super) fn stitched(
     forest: &Forest,
     gathers: &[Gather],
-    coefficients: &[[f64; 3]],
+    fields: [&[[f64; 3]]; 2],
     noise: impl Fn(usize) -> f64,
-) -> Vec<[f64; 3]> {
+) -> [Vec<[f64; 3]>; 2] {
     let whole = |gather: &Gather| gather.is_whole();
     let stride = forest.stride();
     let mut of_node = vec![u32::MAX; forest.len()];
     gathers.iter().enumerate().for_each(|(k, gather)| of_node[gather.node.index()] = k as u32);
     let basis = forest.basis(CellShape::Square);
-    let mut out = coefficients.to_vec();
+    let mut out = fields.map(<[_]>::to_vec);
     if !basis.is_nested() || basis.order() != 2 {
         return out;
     }
     // the gather over a point of a side, and the value of its function there
-    let value = |side: u32, at: [f64; 2]| -> Option<(usize, [f64; 3])> {
+    let value = |side: u32, at: [f64; 2]| -> Option<(usize, Values)> {
         let mut id = forest.roots()[side as usize];
         let mut x = at;
         while of_node[id.index()] == u32::MAX {
@@ -50,9 +54,9 @@ pub(super) fn stitched(
         }
         let mut functions = [0.0; MOST];
         basis.eval(x, &mut functions);
-        let own = &coefficients[k * stride..k * stride + basis.len()];
         let sum = |sum: [f64; 3], (c, f): (&[f64; 3], &f64)| std::array::from_fn(|i| sum[i] + c[i] * f);
-        Some((k, own.iter().zip(&functions).fold([0.0; 3], sum)))
+        let own = |field: &[[f64; 3]]| field[k * stride..].iter().zip(&functions[..basis.len()]).fold([0.0; 3], sum);
+        Some((k, fields.map(own)))
     };
     let analysis = basis.analysis(2);
     for (k, gather) in gathers.iter().enumerate() {
@@ -69,27 +73,31 @@ pub(super) fn stitched(
                 if at.iter().all(|x| (0.0..=1.0).contains(x))
                     && let Some((other, v)) = value(cell.root, at)
                     && other != k
-                    && (0..3).map(|c| (v[c] - own[c]).abs()).sum::<f64>() <= ALIKE * (noise(k) + noise(other))
+                    && (0..3).map(|c| (v[0][c] - own[0][c]).abs()).sum::<f64>() <= ALIKE * (noise(k) + noise(other))
                 {
-                    (0..3).for_each(|c| sum[c] += v[c]);
+                    for (sum, v) in sum.iter_mut().flatten().zip(v.iter().flatten()) {
+                        *sum += v;
+                    }
                     count += 1.0;
                 }
             }
-            sum.map(|v| v / count)
+            sum.map(|field| field.map(|v| v / count))
         });
-        let samples = |c: usize| -> Vec<f64> {
+        let samples = |f: usize, c: usize| -> Vec<f64> {
             let bilinear = |x: &[f64; 2]| {
                 let [s, t] = *x;
-                (1.0 - s) * (1.0 - t) * corners[0][c]
-                    + s * (1.0 - t) * corners[1][c]
-                    + (1.0 - s) * t * corners[2][c]
-                    + s * t * corners[3][c]
+                (1.0 - s) * (1.0 - t) * corners[0][f][c]
+                    + s * (1.0 - t) * corners[1][f][c]
+                    + (1.0 - s) * t * corners[2][f][c]
+                    + s * t * corners[3][f][c]
             };
             analysis.points.iter().map(bilinear).collect()
         };
-        for c in 0..3 {
-            for (slot, v) in analysis.coefficients(&samples(c)).into_iter().enumerate() {
-                out[k * stride + slot][c] = v;
+        for (f, out) in out.iter_mut().enumerate() {
+            for c in 0..3 {
+                for (slot, v) in analysis.coefficients(&samples(f, c)).into_iter().enumerate() {
+                    out[k * stride + slot][c] = v;
+                }
             }
         }
     }
