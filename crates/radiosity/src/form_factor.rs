@@ -11,7 +11,7 @@ pub struct Polygon {
 
 impl Polygon {
     /// Most corners: a quadrilateral clipped by several planes.
-    const MAX: usize = 10;
+    pub(crate) const MAX: usize = 10;
 
     /// From corners in order.
     ///

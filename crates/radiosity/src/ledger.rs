@@ -105,10 +105,13 @@ impl Ledger {
                 let at = cell.to_root(local);
                 let from = solution.point(side, at);
                 let lit = solution.lit()[leaf];
+                let share = area / power * whole / rays as f64;
                 if lit < 1.0 && (lit == 0.0 || kernel.is_buried(side, from)) {
+                    // what is emitted inside of something stays there
+                    sums[0] += scene.material(scene.sides[side]).radiance * (std::f64::consts::PI * share);
                     continue;
                 }
-                let weight = solution.radiosity(side, at) * (area / power * whole / rays as f64);
+                let weight = solution.radiosity(side, at) * share;
                 let tangent = frame.edges[0].normalize();
                 let bitangent = frame.normal.cross(tangent);
                 let (sine, angle) = (u[2].sqrt(), std::f64::consts::TAU * u[3]);

@@ -92,10 +92,14 @@ pub struct Occluders {
     binary: Bvh2,
     centre: DVec3,
     scale: f64,
+    /// Distances below this, in diagonals, are rounding of coordinates.
+    rounding: f64,
 }
 
 /// Segments end this share of their length before they reach what they aim at.
 const RELATIVE_EPSILON: f64 = 1e-6;
+/// A ray meets nothing closer than this, in diagonals.
+const LEAST: f64 = 1e-11;
 /// Hits closer than this, in diagonals, are at the same place.
 const TIE: f64 = 1e-9;
 /// Margin of the boxes, in units of the scene's diagonal: above the rounding of f32 rays.
@@ -116,6 +120,8 @@ impl Occluders {
     pub fn new(scene: &Scene) -> Self {
         let scale = scene.diagonal();
         let centre = 0.5 * (scene.bounds[0] + scene.bounds[1]);
+        let farthest = scene.bounds[0].abs().max(scene.bounds[1].abs()).max_element();
+        let rounding = (16.0 * f64::EPSILON * farthest / scale).max(LEAST);
         let corners: Vec<Vec<DVec3>> = scene.patches.iter().map(Patch::corners).collect();
         let boxes: Vec<Bounded> = corners
             .iter()
@@ -135,6 +141,7 @@ impl Occluders {
             binary: obvhs::bvh2::builder::build_bvh2(&boxes, params, &mut spent),
             centre,
             scale,
+            rounding,
         }
     }
 
@@ -182,7 +189,7 @@ impl Occluders {
         let stretch = self.scale / direction.length();
         let ray = self.ray(from, direction * stretch, f32::INFINITY);
         // where the ray starts is skipped by name, so this only has to beat rounding
-        let least = 1e-11 * stretch;
+        let least = self.rounding * stretch;
         let mut nearest: Option<(f64, bool, u32)> = None;
         let mut hit = RayHit::none();
         self.wide.ray_traverse(ray, &mut hit, |_, id| {

@@ -46,7 +46,8 @@ impl<'a> Prober<'a> {
 
     /// The side under a point whose normal faces the same way, and the side-local coordinates there.
     ///
-    /// The nearest side within [`REACH`] of the scene's diagonal; ties, at edges, go to the lower side.
+    /// The nearest side within [`REACH`] of the scene's diagonal; ties, at edges, go to the lower side; what another side
+    /// covers is not looked at.
     pub fn find(&self, point: DVec3, normal: DVec3) -> Option<(usize, [f64; 2])> {
         let reach = REACH * self.solution.scene().diagonal();
         let normal = normal.normalize_or_zero();
@@ -59,7 +60,11 @@ impl<'a> Prober<'a> {
                     continue;
                 }
                 let at = frame.closest(point);
-                let distance = (frame.origin + frame.edges[0] * at[0] + frame.edges[1] * at[1]).distance(point);
+                let foot = frame.origin + frame.edges[0] * at[0] + frame.edges[1] * at[1];
+                if self.kernel.is_covered(side, foot) {
+                    continue;
+                }
+                let distance = foot.distance(point);
                 // closer than a thousandth of the reach counts as touching: rounding must not decide ties
                 let distance = if distance < 1e-3 * reach { 0.0 } else { distance };
                 let better = best.is_none_or(|(d, s, _)| distance < d || (distance == d && side < s));

@@ -9,7 +9,7 @@ use glam::DVec3;
 use ondelette_numerics::sobol;
 
 /// Directions that must all meet a back.
-const DIRECTIONS: u32 = 16;
+const DIRECTIONS: u32 = 64;
 
 impl LightKernel {
     /// What the ray from a point of a side meets first, other than its own patch.

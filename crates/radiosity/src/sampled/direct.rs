@@ -3,7 +3,7 @@
 //! Where nothing stands between, the light is smooth: interpolation at Gauss points, judged at test points. Where
 //! something may, it has edges: least squares over a fine grid, judged by its own residuals.
 
-use super::lamps::Lamps;
+use super::lamps::{Lamps, on_cell};
 use crate::kernel::LightKernel;
 use crate::rgb::Rgb;
 use crate::visible::View;
@@ -26,7 +26,7 @@ pub(super) struct Fit {
 
 /// A fit to samples on a grid, by least squares.
 #[derive(Clone, Debug)]
-pub(super) struct Grid {
+struct Grid {
     points: Vec<[f64; 2]>,
     /// Functions at the points, `[point][function]`.
     values: Vec<f64>,
@@ -35,25 +35,32 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    /// The grid of a basis: four points an axis, or two a function and axis.
-    pub(super) fn of(basis: &CellBasis) -> Self {
+    /// The grid of a basis: four parts an axis, or two a function and axis, with a point at random in each, so that no
+    /// pattern of shadows can be in step with it.
+    fn of(basis: &CellBasis, key: u64) -> Self {
         let per_axis = (2 * basis.order()).max(4);
-        let at = |i: usize| (i as f64 + 0.5) / per_axis as f64;
+        let step = 1.0 / per_axis as f64;
         let mut points = Vec::new();
+        let mut place = |corner: [f64; 2], sign: f64| {
+            let key = seed::combine(key, points.len() as u64);
+            let mut at = [seed::unit(seed::combine(key, 1)), seed::unit(seed::combine(key, 2))];
+            if basis.shape() == CellShape::Triangle {
+                at = on_cell(CellShape::Triangle, at);
+            }
+            points.push([0, 1].map(|i| corner[i] + sign * step * at[i]));
+        };
         for j in 0..per_axis {
             for i in 0..per_axis {
-                if basis.shape() == CellShape::Triangle {
-                    // midpoints of the small triangles, upright and turned
-                    let third = 1.0 / (3.0 * per_axis as f64);
-                    let corner = [i as f64 / per_axis as f64, j as f64 / per_axis as f64];
-                    if i + j < per_axis {
-                        points.push([corner[0] + third, corner[1] + third]);
-                    }
-                    if i + j + 1 < per_axis {
-                        points.push([corner[0] + 2.0 * third, corner[1] + 2.0 * third]);
-                    }
-                } else {
-                    points.push([at(i), at(j)]);
+                if basis.shape() == CellShape::Square {
+                    place([i as f64 * step, j as f64 * step], 1.0);
+                    continue;
+                }
+                // small triangles, upright and turned
+                if i + j < per_axis {
+                    place([i as f64 * step, j as f64 * step], 1.0);
+                }
+                if i + j + 1 < per_axis {
+                    place([(i + 1) as f64 * step, (j + 1) as f64 * step], -1.0);
                 }
             }
         }
@@ -117,9 +124,9 @@ impl Grid {
 /// A misfit below this many of its standard deviations is taken for scatter.
 const SIGNIFICANT: f64 = 1.0;
 
-/// Fits the light of the lamps on a cell; `grid` is that of the cell's basis, and a point sends about `rays` to all
-/// lamps together that it may see past many things.
-pub(super) fn fit(kernel: &LightKernel, lamps: &Lamps, forest: &Forest, grid: &Grid, cell: &Cell, rays: f64) -> Fit {
+/// Fits the light of the lamps on a cell; a point sends about `rays` to all lamps together that it may see past many
+/// things.
+pub(super) fn fit(kernel: &LightKernel, lamps: &Lamps, forest: &Forest, cell: &Cell, rays: f64) -> Fit {
     let groups = lamps.groups.len();
     let basis = forest.basis(cell.shape);
     let n = basis.len();
@@ -127,6 +134,7 @@ pub(super) fn fit(kernel: &LightKernel, lamps: &Lamps, forest: &Forest, grid: &G
     let element = kernel.element(cell);
     let is_buried = |x: [f64; 2]| kernel.is_buried(cell.root as usize, element.point(x));
     if seen.is_empty() {
+        let grid = Grid::of(basis, cell.key);
         let open = grid.points.iter().filter(|x| !is_buried(**x)).count();
         let lit = open as f64 / grid.points.len() as f64;
         return Fit { coefficients: vec![0.0; groups * n], misfit: 0.0, scatter: 0.0, lit };
@@ -173,6 +181,7 @@ pub(super) fn fit(kernel: &LightKernel, lamps: &Lamps, forest: &Forest, grid: &G
         let misfit = missed.iter().map(|m| Rgb(m.0.map(f64::abs)).sum()).sum::<f64>() / tests.len() as f64;
         return Fit { coefficients, misfit, scatter: 0.0, lit: 1.0 };
     }
+    let grid = Grid::of(basis, cell.key);
     let count = grid.points.len();
     let values = sample(&mut view, &mut grid.points.iter().copied(), count);
     // where no lamp shines it may be dark inside of something

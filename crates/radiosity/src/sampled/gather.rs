@@ -17,18 +17,21 @@ use std::ops::Range;
 pub(super) const MOST: usize = 36;
 /// Most points of an element.
 const MOST_POINTS: usize = 64;
-/// The leaf of a ray that meets nothing, and of one that meets a black back.
+/// Points of an element that is not coarse.
+const FINE_POINTS: usize = 16;
+/// The leaf of a ray that meets nothing, or a black back.
 const NOWHERE: u32 = u32::MAX;
-const BACK: u32 = u32::MAX - 1;
+/// Directions that a usual element is as good as, before any is drawn.
+const FIRST_LOOK: f64 = 4.0;
 /// Directions of a point and half that iterations use; the last sweep uses all.
-pub(super) const FIRST: u32 = 8;
+const FIRST: u32 = 8;
 
 /// One sample of a row: where on a leaf it arrives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Ray {
     /// Leaf coordinates of its end.
     pub(super) to: [f32; 2],
-    /// The leaf met, or [`NOWHERE`], or [`BACK`].
+    /// The leaf met, or [`NOWHERE`].
     pub(super) leaf: u32,
     /// Index of the point that it starts from.
     pub(super) point: u32,
@@ -85,8 +88,8 @@ impl Gather {
         let points = strata(shape, if fine { 2 } else { 1 }, seed::combine(cell.key, 0x6761_7468));
         Gather {
             node,
+            lit: vec![false; points.len()],
             points,
-            lit: Vec::new(),
             drawn: 0,
             first: Default::default(),
             others: Default::default(),
@@ -100,6 +103,11 @@ impl Gather {
         self.lit.iter().all(|l| *l)
     }
 
+    /// Samples of both halves.
+    pub(super) fn samples(&self) -> usize {
+        self.first.iter().chain(&self.others).map(Vec::len).sum()
+    }
+
     /// Points.
     pub(super) fn points(&self) -> u32 {
         self.points.len() as u32
@@ -111,9 +119,12 @@ impl Gather {
     }
 
     /// Takes drawn samples.
-    pub(super) fn take(&mut self, draw: &Draw, rays: [Vec<Ray>; 2]) {
+    pub(super) fn take(&mut self, draw: &Draw, cast: Cast) {
+        for (p, open) in draw.points.clone().zip(cast.open) {
+            self.lit[p as usize] |= open;
+        }
         let early = (FIRST.saturating_sub(draw.directions.start) as usize).min(draw.directions.len());
-        for (h, rays) in rays.into_iter().enumerate() {
+        for (h, rays) in cast.rays.into_iter().enumerate() {
             for ray in rays.chunks(draw.directions.len()) {
                 self.first[h].extend_from_slice(&ray[..early]);
                 self.others[h].extend_from_slice(&ray[early..]);
@@ -124,11 +135,7 @@ impl Gather {
 
     /// Chooses the functions to fit: at most what the points determine.
     pub(super) fn prepare(&mut self, basis: &CellBasis) {
-        // points that see only backs are inside of something: dark, and no part of the fit
-        self.lit = vec![false; self.points.len()];
-        for ray in self.first.iter().chain(&self.others).flatten() {
-            self.lit[ray.point as usize] |= ray.leaf != BACK;
-        }
+        // points inside of something are dark, and no part of the fit
         let points = self.lit.iter().filter(|l| **l).count();
         if points == 0 {
             self.order = if basis.is_nested() { 1 } else { basis.order() };
@@ -136,8 +143,10 @@ impl Gather {
             return;
         }
         self.order = if basis.is_nested() {
-            // high orders through as many points would swing between them, and the balance would not converge
-            let fits = |p: usize| basis.truncated(p).len() * if p > 2 { 2 } else { 1 } <= points;
+            // through as many points functions would swing between them, nothing would say how wrong they are, and the
+            // balance might not converge
+            let spare = |p: usize| [0.0, 1.0, 1.5, 2.0][p.min(3)];
+            let fits = |p: usize| basis.truncated(p).len() as f64 * spare(p) <= points as f64;
             (1..=basis.order()).rev().find(|&p| fits(p)).unwrap_or(1)
         } else {
             basis.order()
@@ -193,14 +202,16 @@ impl Gather {
             .map(|c| {
                 let mut child = Gather::new(forest, forest.child(self.node, c), false);
                 child.points.clear();
+                child.lit.clear();
                 child.drawn = self.drawn;
                 child
             })
             .collect();
-        for (point, place) in self.points.iter().zip(&mut place) {
+        for ((point, lit), place) in self.points.iter().zip(&self.lit).zip(&mut place) {
             let (c, at) = shape.descend(point.at);
             *place = (c, children[c].points.len() as u32);
             children[c].points.push(Point { at, ..*point });
+            children[c].lit.push(*lit);
         }
         for h in 0..2 {
             for ray in &self.first[h] {
@@ -215,12 +226,23 @@ impl Gather {
         children
             .into_iter()
             .map(|mut child| {
-                let known = child.points.len() as u32;
-                let key = seed::combine(forest.node(child.node).cell.key, 0x6578_7472);
-                child.points.extend(strata(shape, 1, key));
+                let known = child.points();
+                child.add_points(forest, 1);
                 (child, known)
             })
             .collect()
+    }
+
+    /// Whether it has so few points that more of them are worth more than smaller elements.
+    pub(super) fn is_coarse(&self, basis: &CellBasis) -> bool {
+        self.order < basis.order() && self.is_whole() && self.points.len() < FINE_POINTS
+    }
+
+    /// Adds a point in each of the parts that `levels` splits make, without samples.
+    pub(super) fn add_points(&mut self, forest: &Forest, levels: u32) {
+        let cell = forest.node(self.node).cell;
+        self.points.extend(strata(cell.shape, levels, seed::combine(cell.key, 0x6578_7472)));
+        self.lit.resize(self.points.len(), false);
     }
 
     /// Values at the points from one half of the samples.
@@ -310,7 +332,15 @@ impl Gather {
         let noise: f64 = noise.iter().map(|s| (s / points.max(1) as f64).sqrt()).sum();
         // the product of two scattered numbers, the mean of `left` of them
         let certainty = 2.0 * noise * noise / (left.max(1) as f64).sqrt();
-        Verdict { scatter: 0.0, noise, misfit, certainty, share: (used as f64 / points.max(1) as f64).sqrt() }
+        let per_direction = noise * f64::from(self.drawn.max(1)).sqrt();
+        Verdict {
+            scatter: 0.0,
+            noise,
+            per_direction,
+            misfit,
+            certainty,
+            share: (used as f64 / points.max(1) as f64).sqrt(),
+        }
     }
 }
 
@@ -332,6 +362,8 @@ pub(super) struct Verdict {
     pub(super) scatter: f64,
     /// The same at the points, before the fit.
     pub(super) noise: f64,
+    /// The same of one direction.
+    pub(super) per_direction: f64,
     /// Mean product of what both halves' fits leave over at the points: on average the square of what the functions
     /// cannot say.
     pub(super) misfit: f64,
@@ -339,6 +371,15 @@ pub(super) struct Verdict {
     pub(super) certainty: f64,
     /// Scatter of the fit over noise at the points, as expected.
     pub(super) share: f64,
+}
+
+impl Verdict {
+    /// Adds what few samples leave open: as if [`FIRST_LOOK`] directions had had the `usual` square of the noise of one.
+    pub(super) fn doubt(&mut self, usual: f64, drawn: f64) {
+        let more = usual * FIRST_LOOK / (drawn.max(1.0) * (drawn + FIRST_LOOK));
+        self.noise = self.noise.hypot(more.sqrt());
+        self.scatter = self.scatter.hypot(self.share * more.sqrt());
+    }
 }
 
 /// A point at random in each of the parts that `levels` splits of a cell make: a mean over them has no bias.
@@ -358,18 +399,29 @@ fn strata(shape: CellShape, levels: u32, key: u64) -> Vec<Point> {
     (0..parts).map(place).collect()
 }
 
+/// Drawn samples.
+#[derive(Clone, Debug)]
+pub(super) struct Cast {
+    /// Of each half, point by point.
+    rays: [Vec<Ray>; 2],
+    /// Which of the points are not inside of something.
+    open: Vec<bool>,
+}
+
 /// Draws samples for both halves.
-pub(super) fn cast(kernel: &LightKernel, forest: &Forest, gather: &Gather, draw: &Draw) -> [Vec<Ray>; 2] {
+pub(super) fn cast(kernel: &LightKernel, forest: &Forest, gather: &Gather, draw: &Draw) -> Cast {
     let cell = forest.node(gather.node).cell;
     let side = cell.root as usize;
     let element = kernel.element(&cell);
     let covers = kernel.has_covers(side);
-    [0u64, 1].map(|half| {
-        let mut rays = Vec::with_capacity(draw.rays() / 2);
-        for p in draw.points.clone() {
-            let point = &gather.points[p as usize];
-            let x = element.point(point.at);
-            let covered = covers && kernel.is_covered(side, x);
+    let mut rays = [0, 1].map(|_| Vec::with_capacity(draw.rays() / 2));
+    let mut open = Vec::with_capacity(draw.points.len());
+    for p in draw.points.clone() {
+        let point = &gather.points[p as usize];
+        let x = element.point(point.at);
+        let covered = covers && kernel.is_covered(side, x);
+        let mut only_backs = !covered;
+        for (rays, half) in rays.iter_mut().zip([0u64, 1]) {
             let key = seed::combine(point.key, half);
             for index in draw.directions.clone() {
                 let nowhere = Ray { to: [0.0; 2], leaf: NOWHERE, point: p };
@@ -378,13 +430,12 @@ pub(super) fn cast(kernel: &LightKernel, forest: &Forest, gather: &Gather, draw:
                     continue;
                 }
                 let [u, v, ..] = sobol::point(key, index);
-                let Some(hit) = kernel.first_hit_from(side, x, kernel.direction(side, [u, v])) else {
-                    rays.push(nowhere);
-                    continue;
-                };
-                rays.push(match kernel.side_of(hit.patch, !hit.front) {
-                    None => Ray { leaf: BACK, ..nowhere },
-                    Some(met) => {
+                let hit = kernel.first_hit_from(side, x, kernel.direction(side, [u, v]));
+                let met = hit.and_then(|hit| Some((hit, kernel.side_of(hit.patch, !hit.front)?)));
+                only_backs &= hit.is_some() && met.is_none();
+                rays.push(match met {
+                    None => nowhere,
+                    Some((hit, met)) => {
                         let at = if hit.front { hit.at } else { [hit.at[1], hit.at[0]] };
                         let (leaf, to) = forest.locate(met, at);
                         Ray { to: to.map(|x| x as f32), leaf: leaf.0, ..nowhere }
@@ -392,14 +443,15 @@ pub(super) fn cast(kernel: &LightKernel, forest: &Forest, gather: &Gather, draw:
                 });
             }
         }
-        rays
-    })
+        open.push(!only_backs || !kernel.is_buried(side, x));
+    }
+    Cast { rays, open }
 }
 
 /// Follows rays whose leaf was split since.
 fn relocate(forest: &Forest, rays: &mut [Ray]) {
     for ray in rays {
-        if ray.leaf >= BACK {
+        if ray.leaf == NOWHERE {
             continue;
         }
         let mut id = NodeId(ray.leaf);
@@ -458,7 +510,7 @@ impl<'a> Field<'a> {
 
     /// What a ray meets.
     fn met(&self, ray: &Ray) -> [f64; 3] {
-        if ray.leaf >= BACK {
+        if ray.leaf == NOWHERE {
             return [0.0; 3];
         }
         let [s, t] = ray.to.map(f64::from);

@@ -1,8 +1,9 @@
 //! The emitters as a receiver sees them: which of them matter to an element, what may stand between, and what they
 //! bring to a point.
 
+use super::sphere::Cone;
 use crate::form_factor::{Polygon, point_to_polygon};
-use crate::kernel::{Element, LightKernel, density};
+use crate::kernel::{Element, LightKernel};
 use crate::occluder::Shaft;
 use crate::rgb::Rgb;
 use crate::scene::Scene;
@@ -14,6 +15,8 @@ use ondelette_wavelet::cell::CellShape;
 
 /// Emitters up to which each is a lamp of its own; fainter ones are met by rays.
 pub(super) const MOST_LAMPS: usize = 4096;
+/// Emitting materials up to which each is known apart; the lamps of fainter ones are met by rays, too.
+const MOST_GROUPS: usize = 32;
 /// Blockers up to which the visible part of a lamp is cut out exactly; beyond, rays decide.
 const MOST_BLOCKERS: usize = 24;
 /// Share of a lamp below which its visible part counts as a crack.
@@ -79,19 +82,12 @@ impl Sight {
 impl Lamps {
     /// The emitters of a scene; `error` is promised.
     pub(super) fn of(scene: &Scene, kernel: &LightKernel, error: f64) -> Self {
-        let mut groups: Vec<(u32, Rgb)> = Vec::new();
+        let groups = strongest(scene);
         let mut lamps = Vec::new();
         for (side, frame) in scene.sides.iter().enumerate() {
             let material = scene.patches[frame.patch as usize].material;
             let exitance = scene.materials[material as usize].radiance * std::f64::consts::PI;
-            if exitance.sum() <= 0.0 {
-                continue;
-            }
-            let known = groups.iter().position(|g| g.0 == material);
-            let group = known.unwrap_or_else(|| {
-                groups.push((material, exitance));
-                groups.len() - 1
-            });
+            let Some(group) = groups.iter().position(|g| g.0 == material) else { continue };
             let shape = kernel.sides()[side].shape;
             let element = kernel.element(&Cell::root(side as u32, shape));
             let (centre, radius) = element.ball();
@@ -208,7 +204,7 @@ impl Lamps {
             let exact = match &sight.between {
                 Between::Nothing if covers.is_empty() => point_to_polygon(x, n, &lamp.polygon.clipped(x, n)),
                 Between::Many(rays) => {
-                    let mut whole = None;
+                    let mut clipped = None;
                     for (half, out) in out[lamp.group].iter_mut().enumerate() {
                         // a whole number of rays, on average as many as planned; none for most of the faint lamps
                         let key = seed::combine(seed::combine(key, half as u64), lamp.side as u64);
@@ -216,11 +212,9 @@ impl Lamps {
                         if count == 0.0 {
                             continue;
                         }
-                        let whole = *whole.get_or_insert_with(|| point_to_polygon(x, n, &lamp.polygon.clipped(x, n)));
-                        if whole > 0.0 {
-                            let chance = (0.5 * rays).min(1.0);
-                            *out += whole * self.open_share(kernel, lamp, side, (x, n), (key, count as u32)) / chance;
-                        }
+                        let polygon = clipped.get_or_insert_with(|| lamp.polygon.clipped(x, n));
+                        let chance = (0.5 * rays).min(1.0);
+                        *out += self.sampled(kernel, lamp, polygon, side, (x, n), (key, count as u32)) / chance;
                     }
                     continue;
                 }
@@ -245,32 +239,67 @@ impl Lamps {
         }
     }
 
-    /// Visible share of a lamp from a point, weighted with the kernel, by rays.
-    fn open_share(
+    /// What the visible part of a lamp brings to a point, by rays to its part above the horizon, evenly over the solid
+    /// angle.
+    fn sampled(
         &self,
         kernel: &LightKernel,
         lamp: &Lamp,
+        polygon: &Polygon,
         side: usize,
-        at: (DVec3, DVec3),
+        (x, n): (DVec3, DVec3),
         (key, rays): (u64, u32),
     ) -> f64 {
-        let (x, n) = at;
+        let corners = polygon.corners();
+        let mut cones = [None; Polygon::MAX];
+        let mut whole = 0.0;
+        for (i, slot) in (1..corners.len().saturating_sub(1)).zip(&mut cones) {
+            let cone = Cone::new([corners[0] - x, corners[i] - x, corners[i + 1] - x]);
+            whole += cone.solid_angle;
+            *slot = Some((cone, whole));
+        }
+        let Some((last, _)) = cones.iter().flatten().last().copied().filter(|_| whole > 0.0) else { return 0.0 };
         let patches = [kernel.sides()[side].patch, lamp.patch];
-        let (mut open, mut whole) = (0.0, 0.0);
+        let m = lamp.element.normal();
+        let mut sum = 0.0;
         for i in 0..rays {
             let [s, t, ..] = sobol::point(key, i);
-            let y = on_cell(lamp.element.shape(), [s, t]);
-            let point = lamp.element.point(y);
-            let weight = density(x, n, point, lamp.element.normal());
-            if weight > 0.0 {
-                whole += weight;
-                if !kernel.is_covered(lamp.side, point) && !kernel.occluders().blocked(x, point, patches) {
-                    open += weight;
-                }
+            let at = s * whole;
+            let chosen = cones.iter().flatten().find(|c| at < c.1);
+            let (cone, end) = chosen.copied().unwrap_or((last, whole));
+            let s = ((at - (end - cone.solid_angle)) / cone.solid_angle).clamp(0.0, 1.0);
+            let (direction, density) = cone.direction([s, t]);
+            let towards = m.dot(direction);
+            let cosine = n.dot(direction) / direction.length();
+            // edge-on, and below the horizon by rounding
+            if towards >= 0.0 || cosine.is_nan() || cosine <= 0.0 {
+                continue;
+            }
+            let point = x + direction * (m.dot(corners[0] - x) / towards);
+            if !kernel.is_covered(lamp.side, point) && !kernel.occluders().blocked(x, point, patches) {
+                sum += cosine * whole / (density * cone.solid_angle);
             }
         }
-        if whole > 0.0 { open / whole } else { 0.0 }
+        sum / (std::f64::consts::PI * f64::from(rays))
     }
+}
+
+/// The emitting materials that give off most, with their exitances, in the order of materials.
+fn strongest(scene: &Scene) -> Vec<(u32, Rgb)> {
+    let mut areas = vec![0.0; scene.materials.len()];
+    for side in &scene.sides {
+        let patch = &scene.patches[side.patch as usize];
+        areas[patch.material as usize] += patch.area();
+    }
+    let exitance = |m: usize| scene.materials[m].radiance * std::f64::consts::PI;
+    let mut found: Vec<usize> = (0..areas.len()).filter(|&m| exitance(m).sum() > 0.0).collect();
+    found.sort_by(|&a, &b| {
+        let power = |m: usize| exitance(m).sum() * areas[m];
+        power(b).total_cmp(&power(a)).then(a.cmp(&b))
+    });
+    found.truncate(MOST_GROUPS);
+    found.sort_unstable();
+    found.into_iter().map(|m| (m as u32, exitance(m))).collect()
 }
 
 /// A point of the unit square, folded onto a cell's domain.

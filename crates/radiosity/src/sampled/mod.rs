@@ -6,13 +6,15 @@
 //! wherever they arrive. No pair of surfaces is ever looked at, so n surfaces cost about n log n; no element of one
 //! part refines the other.
 //!
-//! [`lamps`] -> [`direct`] (D on an element), [`gather`] (a row of I) -> [`Sampled`] (the stepped solver) with [`plan`]
-//! (what to spend the next batch on).
+//! [`lamps`] -> [`direct`] (D on an element), [`gather`] (a row of I) -> [`Sampled`] (the stepped solver) with [`balance`]
+//! (the equations solved) and [`plan`] (what to spend the next batch on).
 
+mod balance;
 mod direct;
 mod gather;
 mod lamps;
 mod plan;
+mod sphere;
 mod stitch;
 
 use crate::kernel::LightKernel;
@@ -21,13 +23,12 @@ use crate::scene::Scene;
 use crate::settings::Settings;
 use crate::solution::{Solution, Statistics};
 use crate::solver::{Event, SolveError};
-use direct::Grid;
-use gather::{Draw, Field, Gather, Verdict};
+use balance::{Spread, Sweep};
+use gather::{Draw, Gather, Verdict};
 use lamps::Lamps;
 use ondelette_compress::{Forest, Links, NodeId, transport};
 use ondelette_numerics::krylov::Gmres;
 use ondelette_numerics::par;
-use ondelette_wavelet::cell::CellShape;
 use std::sync::Arc;
 
 /// Elements are at first no larger than this share of the scene's surface.
@@ -42,8 +43,6 @@ const RAYS_A_STEP: usize = 16_384;
 const LEAST_LAMP_RAYS: f32 = 8.0;
 /// Pairs of element and lamp fitted in one step.
 const FITS_A_STEP: usize = 1024;
-/// Krylov vectors kept before a restart.
-const RESTART: usize = 30;
 
 enum Phase {
     /// Fitting direct light on new elements; then drawing samples, if there are any to draw.
@@ -57,8 +56,11 @@ enum Phase {
         draws: Vec<Draw>,
         done: usize,
     },
-    /// Balancing.
+    /// Gathering the present solution with all samples.
+    Sweeping(Sweep),
+    /// Balancing with the first samples of every element: towards the solution, or the scatter's way through it.
     Solving(Box<Gmres<3>>),
+    Spreading(Spread),
     Finished,
 }
 
@@ -69,8 +71,6 @@ pub(crate) struct Sampled {
     kernel: LightKernel,
     lamps: Lamps,
     forest: Forest,
-    /// Of squares and of triangles.
-    grids: [Grid; 2],
     /// Direct light for unit exitance: `[node][group][function]`.
     direct: Vec<f64>,
     /// Mean absolute misfit of the direct light of each leaf, channels summed.
@@ -89,6 +89,8 @@ pub(crate) struct Sampled {
     counted_area: f64,
     /// Integral of the irradiance over counted sides, channels summed; 0 before the first balance.
     whole: f64,
+    /// Solves of the present samples so far.
+    corrections: u32,
     /// What share of the promise batches aim at.
     aim: f64,
     rounds: u32,
@@ -139,12 +141,12 @@ impl Sampled {
             settings,
             kernel,
             lamps,
-            grids: [CellShape::Square, CellShape::Triangle].map(|shape| Grid::of(forest.basis(shape))),
             forest,
             gathers,
             phase: Phase::Fitting { nodes: leaves, done: 0, draws },
             counted_area,
             whole: 0.0,
+            corrections: 0,
             aim: plan::AIM,
             rounds: 0,
             refitted: false,
@@ -162,7 +164,9 @@ impl Sampled {
         match std::mem::replace(&mut self.phase, Phase::Finished) {
             Phase::Fitting { nodes, done, draws } => Some(self.fit(nodes, done, draws)),
             Phase::Casting { draws, done } => Some(self.cast(draws, done)),
-            Phase::Solving(gmres) => Some(self.sweep(gmres)),
+            Phase::Sweeping(sweep) => Some(self.sweep(sweep)),
+            Phase::Solving(gmres) => Some(self.solve(gmres)),
+            Phase::Spreading(spread) => Some(self.spread(spread)),
             Phase::Finished => None,
         }
     }
@@ -198,8 +202,7 @@ impl Sampled {
         let batch = &nodes[done..done + count];
         let fits = par::map(count, |i| {
             let cell = self.forest.node(batch[i]).cell;
-            let grid = &self.grids[usize::from(cell.shape == CellShape::Triangle)];
-            direct::fit(&self.kernel, &self.lamps, &self.forest, grid, &cell, f64::from(self.rays[batch[i].index()]))
+            direct::fit(&self.kernel, &self.lamps, &self.forest, &cell, f64::from(self.rays[batch[i].index()]))
         });
         let (groups, stride) = (self.lamps.groups.len(), self.forest.stride());
         for (&id, fit) in batch.iter().zip(fits) {
@@ -272,7 +275,7 @@ impl Sampled {
             self.phase = Phase::Casting { draws, done: done + count };
         } else {
             self.prepare();
-            self.start_solving();
+            self.start_sweeping();
         }
         event
     }
@@ -344,77 +347,6 @@ impl Sampled {
                 }
             }
         }
-    }
-
-    /// What the gathers receive from a radiosity, by their first samples.
-    fn gather_short(&self, radiosity: &[[f64; 3]]) -> Vec<[f64; 3]> {
-        let field = Field::new(&self.forest, radiosity);
-        let stride = self.forest.stride();
-        let mut out = vec![[0.0; 3]; self.gathers.len() * stride];
-        par::for_each_chunk(&mut out, 16 * stride, |chunk, slots| {
-            for (k, own) in slots.chunks_mut(stride).enumerate() {
-                self.gathers[chunk * 16 + k].gather(&field, own);
-            }
-        });
-        out
-    }
-
-    fn start_solving(&mut self) {
-        let mut values = self.direct_light();
-        self.add_indirect(&self.indirect, &mut values);
-        self.reflect(&mut values, true);
-        let mut residual = self.gather_short(&values);
-        for (r, i) in residual.iter_mut().zip(&self.indirect) {
-            (0..3).for_each(|c| r[c] -= i[c]);
-        }
-        let stride = self.forest.stride();
-        let mut weights = vec![0.0; residual.len()];
-        for (k, gather) in self.gathers.iter().enumerate() {
-            let node = self.forest.node(gather.node);
-            let basis = self.forest.basis_of(gather.node);
-            if self.counts(node.cell.root) {
-                let share = if basis.is_nested() { node.measure } else { node.measure / basis.len() as f64 };
-                weights[k * stride..k * stride + basis.len()].fill(share);
-            }
-        }
-        self.statistics.iterations += 1;
-        self.phase = Phase::Solving(Box::new(Gmres::new(self.indirect.clone(), residual, weights)));
-    }
-
-    fn sweep(&mut self, mut gmres: Box<Gmres<3>>) -> Event {
-        let highest = self.scene.materials.iter().map(|m| m.reflectance.max()).fold(0.0, f64::max);
-        // no finer than the present error needs: it is refined anyway
-        let tolerance = self.settings.error.max(0.3 * self.error.min(0.3));
-        let wanted = 0.1 * tolerance * (1.0 - highest);
-        let whole = if self.whole > 0.0 { self.whole } else { self.integral(&self.direct_light()) };
-        let residual = |g: &Gmres<3>| {
-            let r = g.residual().iter().sum::<f64>() * self.counted_area.sqrt();
-            if whole > 0.0 { r / whole } else { 0.0 }
-        };
-        let now = residual(&gmres);
-        let direction = if now <= wanted { None } else { gmres.direction() };
-        let Some(direction) = direction else {
-            self.indirect = gmres.solution();
-            self.statistics.residual = now;
-            return self.judge(now / (1.0 - highest));
-        };
-        let mut values = vec![[0.0; 3]; self.forest.len() * self.forest.stride()];
-        self.add_indirect(direction, &mut values);
-        self.reflect(&mut values, false);
-        let mut product = self.gather_short(&values);
-        for (p, d) in product.iter_mut().zip(direction) {
-            (0..3).for_each(|c| p[c] = d[c] - p[c]);
-        }
-        gmres.supply(product);
-        self.statistics.iterations += 1;
-        let event = Event::Iterated { iterations: self.statistics.iterations, residual: residual(&gmres), wanted };
-        if gmres.steps() >= RESTART {
-            self.indirect = gmres.solution();
-            self.start_solving();
-        } else {
-            self.phase = Phase::Solving(gmres);
-        }
-        event
     }
 
     /// Integral over counted sides, channels summed, of coefficients at the leaves.

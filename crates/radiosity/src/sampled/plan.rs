@@ -4,11 +4,10 @@
 //! (half the difference of two independent halves), and what the functions of the gathering elements cannot say (the
 //! product of both halves' misses, which is free of scatter on average).
 
-use super::gather::{self, Draw, Field, Gather};
-use super::{Phase, Sampled, stitch};
+use super::gather::{Draw, Gather};
+use super::{Phase, Sampled};
 use crate::solver::Event;
 use ondelette_compress::NodeId;
-use ondelette_numerics::par;
 
 /// The estimate of the mean absolute error times this is above the root mean square of most surfaces, too.
 const SAFETY: f64 = 1.55;
@@ -43,34 +42,8 @@ const PATIENT_ROUNDS: u32 = 3;
 const MOST_ROUNDS: u32 = 40;
 
 impl Sampled {
-    /// Gathers with all samples, estimates the error, and plans what comes next.
+    /// Estimates the error, and plans what comes next.
     pub(super) fn judge(&mut self, unsolved: f64) -> Event {
-        let stride = self.forest.stride();
-        let mut irradiance = self.direct_light();
-        let mut values = irradiance.clone();
-        self.add_indirect(&self.indirect, &mut values);
-        self.reflect(&mut values, true);
-        let field = Field::new(&self.forest, &values);
-        let judged = par::map(self.gathers.len(), |k| {
-            let (mut out, mut apart) = (vec![[0.0; 3]; stride], vec![[0.0; 3]; stride]);
-            let verdict = self.gathers[k].judge(&field, &mut out, &mut apart);
-            (verdict, out, apart)
-        });
-        let mut apart = vec![[0.0; 3]; self.indirect.len()];
-        for (k, (verdict, out, half)) in judged.into_iter().enumerate() {
-            self.verdicts[k] = verdict;
-            self.indirect[k * stride..(k + 1) * stride].copy_from_slice(&out);
-            apart[k * stride..(k + 1) * stride].copy_from_slice(&half);
-        }
-        self.statistics.iterations += 1;
-        let noise = |k: usize| self.verdicts[k].noise;
-        let [smooth, apart] = stitch::stitched(&self.forest, &self.gathers, [&self.indirect, &apart], noise);
-        for (k, verdict) in self.verdicts.iter_mut().enumerate() {
-            let basis = self.forest.basis_of(self.gathers[k].node);
-            verdict.scatter = gather::size_of(basis, &apart[k * stride..]);
-        }
-        self.add_indirect(&smooth, &mut irradiance);
-        self.irradiance = irradiance;
         self.whole = self.integral(&self.irradiance);
         self.error = if self.whole > 0.0 { SAFETY * self.missed() / self.whole + unsolved } else { 0.0 };
         self.rounds += 1;
@@ -90,15 +63,20 @@ impl Sampled {
         event
     }
 
-    /// All three errors together, as an integral over counted sides, channels summed: where they are independent of one
-    /// another their squares add up.
+    /// All three errors together, as an integral over counted sides, channels summed: on every leaf they are independent
+    /// of one another, so their squares add up there.
     fn missed(&self) -> f64 {
+        let root = |k: usize| self.verdicts[k].misfit.max(0.0).sqrt();
+        let counted = |k: &usize| self.counts(self.forest.node(self.gathers[*k].node).cell.root);
+        let roots: f64 = (0..self.gathers.len())
+            .filter(counted)
+            .map(|k| self.forest.node(self.gathers[k].node).measure * root(k))
+            .sum();
+        let scale = if roots > 0.0 { self.misfit_of_gathers() / roots } else { 0.0 };
         let mut local = vec![0.0; self.forest.len()];
-        for (gather, verdict) in self.gathers.iter().zip(&self.verdicts) {
-            let node = self.forest.node(gather.node);
-            if self.counts(node.cell.root) {
-                local[gather.node.index()] = MEAN_OF_SCATTER * verdict.scatter;
-            }
+        for k in (0..self.gathers.len()).filter(counted) {
+            let scatter = MEAN_OF_SCATTER * self.verdicts[k].scatter;
+            local[self.gathers[k].node.index()] = scatter.hypot(scale * root(k));
         }
         let mut together = 0.0;
         for (n, node) in self.forest.nodes().iter().enumerate() {
@@ -116,7 +94,7 @@ impl Sampled {
                 together += area * direct.hypot(local[n].hypot(scatter));
             }
         }
-        together.hypot(self.misfit_of_gathers())
+        together
     }
 
     /// Integral of what the gathering elements' functions cannot say: roots of estimated squares, less what scatter
@@ -127,7 +105,10 @@ impl Sampled {
             let node = self.forest.node(gather.node);
             if self.counts(node.cell.root) {
                 let root = node.measure * verdict.misfit.max(0.0).sqrt();
-                sum += root - FLOOR * node.measure * verdict.certainty.sqrt();
+                sum += root;
+                if verdict.misfit < verdict.certainty {
+                    sum -= FLOOR * node.measure * verdict.certainty.sqrt();
+                }
                 if verdict.misfit > SIGNIFICANT * verdict.certainty {
                     sure += root;
                 }
@@ -138,6 +119,9 @@ impl Sampled {
 
     /// Plans the next batch: direct light first, then the gathered.
     pub(super) fn spend(&mut self) {
+        let mut values = self.direct_light();
+        self.add_indirect(&self.indirect, &mut values);
+        self.whole = self.integral(&values);
         loop {
             let aim = self.aim * self.settings.error * self.whole / SAFETY;
             let leaves = self.worst_leaves(SHARES[0] * aim);
@@ -259,8 +243,13 @@ impl Sampled {
             chosen.push(k);
         }
         chosen.sort_unstable();
-        let leaves: Vec<NodeId> =
-            chosen.iter().map(|&k| self.gathers[k].node).filter(|&id| self.forest.is_leaf(id)).collect();
+        let coarse = |k: usize| self.gathers[k].is_coarse(self.forest.basis_of(self.gathers[k].node));
+        let leaves: Vec<NodeId> = chosen
+            .iter()
+            .filter(|k| !coarse(**k))
+            .map(|&k| self.gathers[k].node)
+            .filter(|&id| self.forest.is_leaf(id))
+            .collect();
         let fresh = self.split(&leaves);
         let stride = self.forest.stride();
         let mut gathers: Vec<Gather> = Vec::with_capacity(self.gathers.len() + 3 * chosen.len());
@@ -277,6 +266,20 @@ impl Sampled {
                 continue;
             }
             let basis = self.forest.basis_of(gather.node);
+            if gather.is_coarse(basis) {
+                let mut gather = gather;
+                let known = gather.points();
+                gather.add_points(&self.forest, 2);
+                draws.push(Draw {
+                    gather: gathers.len() as u32,
+                    points: known..gather.points(),
+                    directions: 0..gather.drawn,
+                });
+                gathers.push(gather);
+                indirect.extend_from_slice(own);
+                verdicts.push(self.verdicts[k]);
+                continue;
+            }
             for (c, (child, known)) in gather.split(&self.forest).into_iter().enumerate() {
                 let mut values = vec![[0.0; 3]; stride];
                 let n = basis.len();

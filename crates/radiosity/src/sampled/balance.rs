@@ -1,0 +1,250 @@
+//! The balance: I = K r (D + I) for the rows K that were sampled and the reflectance r.
+//!
+//! A sweep with all samples says what is left over; the few first samples of every element are a cheap operator, close
+//! enough to correct it: what is left over is solved with them, and the next sweep sees how much of it is gone. So the
+//! solution is that of all samples, and an iteration reads few.
+//!
+//! The scatter of the rows goes the same way as light: what one element receives too much, all others receive again
+//! after reflection. Where much is reflected, this common part is larger than the scatter itself. It is found by solving
+//! for the scatter, with signs drawn at random for the elements, a few times over.
+
+use super::gather::{self, Field, Verdict};
+use super::{Phase, Sampled, stitch};
+use crate::solver::Event;
+use ondelette_numerics::krylov::Gmres;
+use ondelette_numerics::{par, seed};
+
+/// Krylov vectors kept before a restart.
+const RESTART: usize = 30;
+/// Samples read in a step of a sweep.
+const READS_A_STEP: usize = 1 << 20;
+/// Most solves for one set of samples.
+const MOST_CORRECTIONS: u32 = 12;
+/// Draws of signs for the scatter.
+const PATTERNS: u64 = 3;
+/// The part of the scatter that others pass on is wanted to this share of the scatter.
+const SPREAD_TOLERANCE: f64 = 0.15;
+/// Most Krylov vectors for it.
+const SPREAD_STEPS: usize = 12;
+
+/// A sweep with all samples.
+pub(super) struct Sweep {
+    /// What every leaf sends on.
+    radiosity: Vec<[f64; 3]>,
+    /// What is gathered, and half the difference of the halves, `[gather][function]`.
+    gathered: Vec<[f64; 3]>,
+    apart: Vec<[f64; 3]>,
+    done: usize,
+}
+
+/// The scatter on its way.
+pub(super) struct Spread {
+    gmres: Box<Gmres<3>>,
+    /// Scatter of each row, and the sum of squares of what others pass on.
+    apart: Vec<[f64; 3]>,
+    passed: Vec<[f64; 3]>,
+    pattern: u64,
+    /// What the balance left open.
+    unsolved: f64,
+}
+
+impl Sampled {
+    /// Begins a sweep of the present solution.
+    pub(super) fn start_sweeping(&mut self) {
+        let mut radiosity = self.direct_light();
+        self.add_indirect(&self.indirect, &mut radiosity);
+        self.reflect(&mut radiosity, true);
+        let empty = vec![[0.0; 3]; self.indirect.len()];
+        self.phase = Phase::Sweeping(Sweep { radiosity, gathered: empty.clone(), apart: empty, done: 0 });
+    }
+
+    pub(super) fn sweep(&mut self, mut sweep: Sweep) -> Event {
+        let stride = self.forest.stride();
+        let (mut count, mut reads) = (0, 0);
+        while sweep.done + count < self.gathers.len() && reads < READS_A_STEP {
+            reads += self.gathers[sweep.done + count].samples();
+            count += 1;
+        }
+        let field = Field::new(&self.forest, &sweep.radiosity);
+        let gathers = &self.gathers[sweep.done..sweep.done + count];
+        let judged = par::map(count, |k| {
+            let (mut out, mut apart) = (vec![[0.0; 3]; stride], vec![[0.0; 3]; stride]);
+            let verdict = gathers[k].judge(&field, &mut out, &mut apart);
+            (verdict, out, apart)
+        });
+        for (k, (verdict, out, apart)) in (sweep.done..).zip(judged) {
+            self.verdicts[k] = verdict;
+            sweep.gathered[k * stride..(k + 1) * stride].copy_from_slice(&out);
+            sweep.apart[k * stride..(k + 1) * stride].copy_from_slice(&apart);
+        }
+        sweep.done += count;
+        let event = Event::Gathering { done: sweep.done, total: self.gathers.len() };
+        if sweep.done < self.gathers.len() {
+            self.phase = Phase::Sweeping(sweep);
+        } else {
+            self.statistics.iterations += 1;
+            self.correct(sweep);
+        }
+        event
+    }
+
+    /// Solves for what a sweep left over, or goes on if that is little.
+    fn correct(&mut self, sweep: Sweep) {
+        let mut residual = sweep.gathered.clone();
+        for (r, i) in residual.iter_mut().zip(&self.indirect) {
+            (0..3).for_each(|c| r[c] -= i[c]);
+        }
+        let gmres = Gmres::new(self.indirect.clone(), residual, self.weights());
+        let left = self.relative(&gmres);
+        self.statistics.residual = left;
+        if left > self.wanted() && self.corrections < MOST_CORRECTIONS {
+            self.corrections += 1;
+            self.phase = Phase::Solving(Box::new(gmres));
+            return;
+        }
+        self.corrections = 0;
+        self.indirect = sweep.gathered;
+        let passed = vec![[0.0; 3]; self.indirect.len()];
+        self.start_spreading(sweep.apart, passed, 0, left / (1.0 - self.highest_reflectance()));
+    }
+
+    pub(super) fn solve(&mut self, mut gmres: Box<Gmres<3>>) -> Event {
+        let (now, wanted) = (self.relative(&gmres), 0.3 * self.wanted());
+        let direction = if now <= wanted || gmres.steps() >= RESTART { None } else { gmres.direction() };
+        let Some(direction) = direction else {
+            self.indirect = gmres.solution();
+            self.start_sweeping();
+            return Event::Iterated { iterations: self.statistics.iterations, residual: now, wanted };
+        };
+        let product = self.apply(direction);
+        gmres.supply(product);
+        self.statistics.iterations += 1;
+        let event = Event::Iterated { iterations: self.statistics.iterations, residual: self.relative(&gmres), wanted };
+        self.phase = Phase::Solving(gmres);
+        event
+    }
+
+    /// x - K r x with the first samples.
+    fn apply(&self, x: &[[f64; 3]]) -> Vec<[f64; 3]> {
+        let mut product = self.pass_on(x);
+        for (p, x) in product.iter_mut().zip(x) {
+            (0..3).for_each(|c| p[c] = x[c] - p[c]);
+        }
+        product
+    }
+
+    /// K r x with the first samples.
+    fn pass_on(&self, x: &[[f64; 3]]) -> Vec<[f64; 3]> {
+        let mut values = vec![[0.0; 3]; self.forest.len() * self.forest.stride()];
+        self.add_indirect(x, &mut values);
+        self.reflect(&mut values, false);
+        let field = Field::new(&self.forest, &values);
+        let stride = self.forest.stride();
+        let mut out = vec![[0.0; 3]; self.gathers.len() * stride];
+        par::for_each_chunk(&mut out, 16 * stride, |chunk, slots| {
+            for (k, own) in slots.chunks_mut(stride).enumerate() {
+                self.gathers[chunk * 16 + k].gather(&field, own);
+            }
+        });
+        out
+    }
+
+    /// Begins with a pattern of signs for the scatter.
+    fn start_spreading(&mut self, apart: Vec<[f64; 3]>, passed: Vec<[f64; 3]>, pattern: u64, unsolved: f64) {
+        let stride = self.forest.stride();
+        let mut signed = apart.clone();
+        for (gather, own) in self.gathers.iter().zip(signed.chunks_mut(stride)) {
+            let key = self.forest.node(gather.node).cell.key;
+            if seed::unit(seed::combine(key, pattern)) < 0.5 {
+                own.iter_mut().flatten().for_each(|v| *v = -*v);
+            }
+        }
+        let right = self.pass_on(&signed);
+        self.statistics.iterations += 1;
+        let start = vec![[0.0; 3]; right.len()];
+        let gmres = Box::new(Gmres::new(start, right, self.weights()));
+        self.phase = Phase::Spreading(Spread { gmres, apart, passed, pattern, unsolved });
+    }
+
+    pub(super) fn spread(&mut self, mut spread: Spread) -> Event {
+        let size = |v: [f64; 3]| v.iter().sum::<f64>();
+        let scatter = size(Gmres::new(spread.apart.clone(), spread.apart.clone(), self.weights()).residual());
+        let open = size(spread.gmres.residual()) > SPREAD_TOLERANCE * scatter && spread.gmres.steps() < SPREAD_STEPS;
+        if let Some(direction) = spread.gmres.direction().filter(|_| open) {
+            let product = self.apply(direction);
+            spread.gmres.supply(product);
+            self.statistics.iterations += 1;
+            let (iterations, residual) = (self.statistics.iterations, self.statistics.residual);
+            self.phase = Phase::Spreading(spread);
+            return Event::Iterated { iterations, residual, wanted: residual };
+        }
+        for (sum, v) in spread.passed.iter_mut().zip(spread.gmres.solution()) {
+            (0..3).for_each(|c| sum[c] += v[c] * v[c]);
+        }
+        if spread.pattern + 1 < PATTERNS {
+            self.start_spreading(spread.apart, spread.passed, spread.pattern + 1, spread.unsolved);
+            let (iterations, residual) = (self.statistics.iterations, self.statistics.residual);
+            return Event::Iterated { iterations, residual, wanted: residual };
+        }
+        let passed: Vec<[f64; 3]> = spread.passed.iter().map(|s| s.map(|s| (s / PATTERNS as f64).sqrt())).collect();
+        self.settle(&spread.apart, &passed);
+        self.judge(spread.unsolved)
+    }
+
+    /// What all this says of each element: the field that is shown, and its scatter.
+    fn settle(&mut self, apart: &[[f64; 3]], passed: &[[f64; 3]]) {
+        let stride = self.forest.stride();
+        let noise = |k: usize| self.verdicts[k].noise;
+        let [smooth, apart] = stitch::stitched(&self.forest, &self.gathers, [&self.indirect, apart], noise);
+        // elements that met nothing bright may just have missed it: they are as uncertain as others were at first
+        let (mut area, mut square) = (0.0, 0.0);
+        for (gather, verdict) in self.gathers.iter().zip(&self.verdicts) {
+            let measure = self.forest.node(gather.node).measure;
+            area += measure;
+            square += measure * verdict.per_direction.powi(2);
+        }
+        let usual = if area > 0.0 { square / area } else { 0.0 };
+        for (k, verdict) in self.verdicts.iter_mut().enumerate() {
+            let basis = self.forest.basis_of(self.gathers[k].node);
+            let own = gather::size_of(basis, &apart[k * stride..]);
+            let passed = gather::size_of(basis, &passed[k * stride..]);
+            *verdict = Verdict { scatter: own.hypot(passed), ..*verdict };
+            verdict.doubt(usual, f64::from(self.gathers[k].drawn));
+        }
+        let mut irradiance = self.direct_light();
+        self.add_indirect(&smooth, &mut irradiance);
+        self.irradiance = irradiance;
+    }
+
+    /// Weights of the coefficients of the gathers in inner products: counted areas.
+    fn weights(&self) -> Vec<f64> {
+        let stride = self.forest.stride();
+        let mut weights = vec![0.0; self.gathers.len() * stride];
+        for (k, gather) in self.gathers.iter().enumerate() {
+            let node = self.forest.node(gather.node);
+            let basis = self.forest.basis_of(gather.node);
+            if self.counts(node.cell.root) {
+                let share = if basis.is_nested() { node.measure } else { node.measure / basis.len() as f64 };
+                weights[k * stride..k * stride + basis.len()].fill(share);
+            }
+        }
+        weights
+    }
+
+    fn highest_reflectance(&self) -> f64 {
+        self.scene.materials.iter().map(|m| m.reflectance.max()).fold(0.0, f64::max)
+    }
+
+    /// Residual at which a solve ends: no finer than the present error needs, which is refined anyway.
+    fn wanted(&self) -> f64 {
+        let tolerance = self.settings.error.max(0.3 * self.error.min(0.3));
+        0.1 * tolerance * (1.0 - self.highest_reflectance())
+    }
+
+    /// Residual relative to the whole irradiance.
+    fn relative(&self, gmres: &Gmres<3>) -> f64 {
+        let whole = if self.whole > 0.0 { self.whole } else { self.integral(&self.direct_light()) };
+        let r = gmres.residual().iter().sum::<f64>() * self.counted_area.sqrt();
+        if whole > 0.0 { r / whole } else { 0.0 }
+    }
+}

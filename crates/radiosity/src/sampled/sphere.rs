@@ -1,0 +1,90 @@
+//! Directions to a triangle, evenly over the solid angle that it fills (Arvo 1995, "Stratified Sampling of Spherical
+//! Triangles").
+
+use glam::DVec3;
+
+/// Below this solid angle a triangle is as good as flat, and its angles are rounding.
+const FLAT: f64 = 1e-3;
+
+/// A triangle as seen from a point.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cone {
+    corners: [DVec3; 3],
+    /// Solid angle in steradians.
+    pub(super) solid_angle: f64,
+    /// Angle at the first corner, and cosine of the side from it to the second.
+    alpha: f64,
+    cos_c: f64,
+}
+
+impl Cone {
+    /// The triangle with these corners relative to the point.
+    pub(super) fn new(corners: [DVec3; 3]) -> Cone {
+        let [a, b, c] = corners.map(|p| p.normalize_or_zero());
+        // van Oosterom and Strackee 1983
+        let volume = a.dot(b.cross(c)).abs();
+        let solid_angle = 2.0 * volume.atan2(1.0 + a.dot(b) + b.dot(c) + c.dot(a));
+        let angle = |p: DVec3, q: DVec3, r: DVec3| {
+            let (u, v) = (p.cross(q), p.cross(r));
+            u.cross(v).length().atan2(u.dot(v))
+        };
+        Cone { corners, solid_angle, alpha: angle(a, b, c), cos_c: a.dot(b) }
+    }
+
+    /// The direction (of any length) for a point of the unit square, and its density per steradian.
+    pub(super) fn direction(&self, [s, t]: [f64; 2]) -> (DVec3, f64) {
+        let [a, b, c] = self.corners;
+        if self.solid_angle < FLAT {
+            let root = s.sqrt();
+            let d = a + (b - a) * (root * (1.0 - t)) + (c - a) * (root * t);
+            let twice = (b - a).cross(c - a);
+            // area per solid angle: r^3 / height
+            let r = d.length();
+            return (d, r * r * r / (0.5 * twice.dot(d).abs()));
+        }
+        let [a, b, c] = [a, b, c].map(|p| p.normalize_or_zero());
+        let across = |p: DVec3, q: DVec3| (p - q * p.dot(q)).normalize_or_zero();
+        let (sin_alpha, cos_alpha) = self.alpha.sin_cos();
+        let (sin, cos) = (s * self.solid_angle - self.alpha).sin_cos();
+        let (u, v) = (cos - cos_alpha, sin + sin_alpha * self.cos_c);
+        let below = (v * sin + u * cos) * sin_alpha;
+        let q = if below == 0.0 { 1.0 } else { (((v * cos - u * sin) * cos_alpha - v) / below).clamp(-1.0, 1.0) };
+        let on_side = a * q + across(c, a) * (1.0 - q * q).max(0.0).sqrt();
+        let z = 1.0 - t * (1.0 - on_side.dot(b));
+        (b * z + across(on_side, b) * (1.0 - z * z).max(0.0).sqrt(), 1.0 / self.solid_angle)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ondelette_numerics::sobol;
+
+    #[test]
+    fn irradiance_by_directions_is_lamberts() {
+        use crate::form_factor::{Polygon, point_to_polygon};
+        // around the zenith, grazing, and so far that the flat rule takes over
+        for corners in [
+            [[1.0, 0.0, 0.1], [0.0, 1.0, 0.1], [-1.0, -1.0, 0.3]],
+            [[3.0, 0.2, 0.4], [4.0, 2.0, 2.0], [2.0, 1.0, 0.5]],
+            [[30.0, 0.2, 40.0], [30.5, 0.2, 40.0], [30.0, 0.9, 41.0]],
+        ] {
+            let corners = corners.map(DVec3::from_array);
+            let cone = Cone::new(corners);
+            let n = 1 << 14;
+            let mut sum = 0.0;
+            for i in 0..n {
+                let [s, t, ..] = sobol::point(7, i);
+                let (d, density) = cone.direction([s, t]);
+                sum += d.normalize().z / (density * std::f64::consts::PI);
+            }
+            let found = sum / f64::from(n);
+            let exact = [0, 2].map(|i| {
+                let turned = [corners[i], corners[1], corners[2 - i]];
+                point_to_polygon(DVec3::ZERO, DVec3::Z, &Polygon::new(&turned))
+            });
+            let exact = exact[0].max(exact[1]);
+            assert!((found / exact - 1.0).abs() < 2e-3, "{corners:?}: {found} for {exact}");
+        }
+    }
+}
