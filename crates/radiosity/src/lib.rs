@@ -15,6 +15,7 @@ pub mod view;
 pub mod visible;
 
 pub use rgb::Rgb;
+pub use sampled::Kept;
 pub use scene::Scene;
 pub use settings::{Basis, Method, Settings};
 pub use solution::{Solution, Statistics};

@@ -1,6 +1,7 @@
 //! What was solved: the irradiance of every side, readable anywhere.
 
 use crate::rgb::Rgb;
+use crate::sampled::Kept;
 use crate::scene::Scene;
 use crate::settings::Settings;
 use glam::DVec3;
@@ -40,6 +41,8 @@ pub struct Solution {
     statistics: Statistics,
     /// Share of each node that is not inside of something.
     lit: Vec<f32>,
+    /// The samples behind it.
+    kept: Option<Arc<Kept>>,
 }
 
 impl Solution {
@@ -58,7 +61,7 @@ impl Solution {
         assert_eq!(irradiance.len(), forest.len() * forest.stride());
         assert_eq!(forest.roots().len(), scene.sides.len());
         let lit = vec![1.0; forest.len()];
-        Solution { scene, settings, forest, links, irradiance, statistics, lit }
+        Solution { scene, settings, forest, links, irradiance, statistics, lit, kept: None }
     }
 
     /// Says which share of each leaf is not inside of something (a floor under a box): the rest is dark, and no part of
@@ -71,6 +74,18 @@ impl Solution {
         assert_eq!(lit.len(), self.forest.len());
         self.lit = lit;
         self
+    }
+
+    /// Adds the samples that relighting and refining go on from (see [`Kept::check`]).
+    #[must_use]
+    pub fn with_kept(mut self, kept: Arc<Kept>) -> Self {
+        self.kept = Some(kept);
+        self
+    }
+
+    /// The samples that were kept, if any.
+    pub fn kept(&self) -> Option<&Arc<Kept>> {
+        self.kept.as_ref()
     }
 
     /// Shares of the nodes that are not inside of something; 1 but for some leaves.

@@ -17,6 +17,7 @@
 //! mean; `docs/formats/onl.md` lists them.
 
 mod error;
+mod kept;
 mod read;
 mod solution;
 mod write;

@@ -1,5 +1,6 @@
 //! A [`Solution`] as chunks of an `.onl` file, and back: everything that a chunk says is checked before it is used.
 
+use super::kept;
 use super::{ChunkFile, ChunkWriter, OnlError};
 use crate::write::WriteError;
 use bytemuck::{Pod, Zeroable};
@@ -94,6 +95,9 @@ fn chunks(solution: &Solution) -> ChunkWriter {
     }
     writer.add_array("links", &links);
     writer.add_array("blocks", solution.links().blocks());
+    if let Some(samples) = solution.kept() {
+        kept::add(&mut writer, samples);
+    }
     writer
 }
 
@@ -125,8 +129,12 @@ pub fn solution_of(file: &ChunkFile) -> Result<Solution, OnlError> {
     }
     let (forest, coefficients) = forest_of(file, &scene, settings)?;
     let links = links_of(file, &forest)?;
+    let samples = if kept::has(file) { Some(Arc::new(kept::read(file, &scene, &forest)?)) } else { None };
     let nodes = forest.len();
-    let solution = Solution::new(Arc::new(scene), settings, forest, links, coefficients, statistics);
+    let mut solution = Solution::new(Arc::new(scene), settings, forest, links, coefficients, statistics);
+    if let Some(samples) = samples {
+        solution = solution.with_kept(samples);
+    }
     if !file.has("lit") {
         return Ok(solution);
     }

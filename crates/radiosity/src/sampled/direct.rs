@@ -5,7 +5,6 @@
 
 use super::lamps::{Lamps, on_cell};
 use crate::kernel::LightKernel;
-use crate::rgb::Rgb;
 use crate::visible::View;
 use ondelette_compress::{Cell, Forest};
 use ondelette_numerics::{dense, seed};
@@ -16,10 +15,10 @@ use ondelette_wavelet::cell::{CellBasis, CellShape};
 pub(super) struct Fit {
     /// For unit exitance of each group of lamps, `[group][function]`.
     pub(super) coefficients: Vec<f64>,
-    /// Mean absolute value of what the functions cannot say, channels summed.
-    pub(super) misfit: f64,
-    /// Root mean square scatter of the fit, where rays decided what is seen, channels summed.
-    pub(super) scatter: f64,
+    /// Mean absolute value of what the functions cannot say, for unit exitance of each group.
+    pub(super) misfit: Vec<f32>,
+    /// Root mean square scatter of the fit, where rays decided what is seen, likewise.
+    pub(super) scatter: Vec<f32>,
     /// Share of the element that is not inside of something.
     pub(super) lit: f64,
 }
@@ -137,7 +136,8 @@ pub(super) fn fit(kernel: &LightKernel, lamps: &Lamps, forest: &Forest, cell: &C
         let grid = Grid::of(basis, cell.key);
         let open = grid.points.iter().filter(|x| !is_buried(**x)).count();
         let lit = open as f64 / grid.points.len() as f64;
-        return Fit { coefficients: vec![0.0; groups * n], misfit: 0.0, scatter: 0.0, lit };
+        let zero = vec![0.0; groups];
+        return Fit { coefficients: vec![0.0; groups * n], misfit: zero.clone(), scatter: zero, lit };
     }
     let masked = seen.iter().any(|s| s.is_masked()) || kernel.has_covers(cell.root as usize);
     let mut view = View::new(kernel.occluders().tolerance());
@@ -158,7 +158,7 @@ pub(super) fn fit(kernel: &LightKernel, lamps: &Lamps, forest: &Forest, cell: &C
         }
         values
     };
-    let exitance = |g: usize| lamps.groups[g].1;
+    let (mut misfit, mut scatter) = (Vec::with_capacity(groups), Vec::with_capacity(groups));
     let mut coefficients = Vec::with_capacity(groups * n);
     if !masked {
         let analysis = basis.analysis(basis.order());
@@ -166,20 +166,20 @@ pub(super) fn fit(kernel: &LightKernel, lamps: &Lamps, forest: &Forest, cell: &C
         let fitted = analysis.points.len();
         let count = fitted + tests.len();
         let values = sample(&mut view, &mut analysis.points.iter().chain(&tests).copied(), count);
-        let mut missed = vec![Rgb::BLACK; tests.len()];
         let mut functions = [0.0; 36];
-        for (g, values) in values.chunks(count).enumerate() {
+        for values in values.chunks(count) {
             let values: Vec<f64> = values.iter().map(|v| v[0]).collect();
             let own = analysis.coefficients(&values[..fitted]);
-            for ((x, value), missed) in tests.iter().zip(&values[fitted..]).zip(&mut missed) {
+            let mut missed = 0.0;
+            for (x, value) in tests.iter().zip(&values[fitted..]) {
                 basis.eval(*x, &mut functions);
                 let predicted: f64 = own.iter().zip(&functions).map(|(c, f)| c * f).sum();
-                *missed += exitance(g) * (value - predicted);
+                missed += (value - predicted).abs();
             }
+            misfit.push((missed / tests.len() as f64) as f32);
             coefficients.extend(own);
         }
-        let misfit = missed.iter().map(|m| Rgb(m.0.map(f64::abs)).sum()).sum::<f64>() / tests.len() as f64;
-        return Fit { coefficients, misfit, scatter: 0.0, lit: 1.0 };
+        return Fit { coefficients, misfit, scatter: vec![0.0; groups], lit: 1.0 };
     }
     let grid = Grid::of(basis, cell.key);
     let count = grid.points.len();
@@ -190,35 +190,34 @@ pub(super) fn fit(kernel: &LightKernel, lamps: &Lamps, forest: &Forest, cell: &C
     let alive = lit.iter().filter(|l| **l).count();
     let part = if alive == count { None } else { Some(grid.part(&lit, n)) };
     let matrix = part.as_ref().unwrap_or(&grid.matrix);
-    let mut left = vec![[Rgb::BLACK; 2]; count];
-    let mut noise = vec![Rgb::BLACK; count];
-    for (g, values) in values.chunks(count).enumerate() {
+    let share = alive as f64 / count as f64;
+    let freedom = alive.saturating_sub(n).max(1) as f64;
+    let alive = alive.max(1) as f64;
+    for values in values.chunks(count) {
         let own: Vec<[f64; 2]> = matrix
             .chunks(count)
             .map(|row| row.iter().zip(values).fold([0.0; 2], |sum, (m, v)| [sum[0] + m * v[0], sum[1] + m * v[1]]))
             .collect();
-        for (q, (row, value)) in grid.values.chunks(n).zip(values).enumerate().filter(|(q, _)| lit[*q]) {
-            for h in 0..2 {
-                let fitted: f64 = row.iter().zip(&own).map(|(r, c)| r * c[h]).sum();
-                left[q][h] += exitance(g) * (value[h] - fitted);
-            }
-            noise[q] += exitance(g) * (0.5 * (value[0] - value[1]));
+        let (mut missed, mut product, mut noise) = (0.0, 0.0, 0.0);
+        for (row, value) in grid.values.chunks(n).zip(values).zip(&lit).filter(|(_, lit)| **lit).map(|(both, _)| both) {
+            let left = [0, 1].map(|h| value[h] - row.iter().zip(&own).map(|(r, c)| r * c[h]).sum::<f64>());
+            missed += left[0].abs();
+            product += left[0] * left[1];
+            noise += (0.5 * (value[0] - value[1])).powi(2);
         }
         coefficients.extend(own.iter().map(|c| 0.5 * (c[0] + c[1])));
-    }
-    let share = alive as f64 / count as f64;
-    let freedom = alive.saturating_sub(n).max(1) as f64;
-    let count = alive.max(1);
-    let noise = (noise.iter().map(|e| Rgb(e.0.map(f64::abs)).sum().powi(2)).sum::<f64>() / count as f64).sqrt();
-    if noise == 0.0 {
         // n functions took n degrees of freedom
-        let missed: f64 = left.iter().map(|l| Rgb(l[0].0.map(f64::abs)).sum()).sum();
-        return Fit { coefficients, misfit: missed / (count as f64 * freedom).sqrt(), scatter: 0.0, lit: share };
+        let square = noise / alive;
+        misfit.push(if square == 0.0 {
+            missed / (alive * freedom).sqrt()
+        } else if product / freedom > SIGNIFICANT * 2.0 * square / freedom.sqrt() {
+            MEAN_OF_ROOT * (product / freedom).sqrt()
+        } else {
+            0.0
+        } as f32);
+        scatter.push((square * n as f64 / alive).sqrt() as f32);
     }
-    let square: f64 = left.iter().map(|[a, b]| a.sum() * b.sum()).sum::<f64>() / freedom;
-    let certain = square > SIGNIFICANT * 2.0 * noise * noise / freedom.sqrt();
-    let misfit = if certain { MEAN_OF_ROOT * square.sqrt() } else { 0.0 };
-    Fit { coefficients, misfit, scatter: noise * (n as f64 / count as f64).sqrt(), lit: share }
+    Fit { coefficients, misfit, scatter, lit: share }
 }
 
 /// Mean absolute value of a misfit, over its root mean square, about.

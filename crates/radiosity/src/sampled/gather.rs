@@ -15,12 +15,8 @@ use std::ops::Range;
 
 /// Most functions of a basis.
 pub(super) const MOST: usize = 36;
-/// Most points of an element.
-const MOST_POINTS: usize = 64;
 /// Points of an element that is not coarse.
 const FINE_POINTS: usize = 16;
-/// The leaf of a ray that meets nothing, or a black back.
-const NOWHERE: u32 = u32::MAX;
 /// Directions that a usual element is as good as, before any is drawn.
 const FIRST_LOOK: f64 = 4.0;
 /// Directions of a point and half that iterations use; the last sweep uses all.
@@ -31,18 +27,24 @@ const FIRST: u32 = 8;
 pub(super) struct Ray {
     /// Leaf coordinates of its end.
     pub(super) to: [f32; 2],
-    /// The leaf met, or [`NOWHERE`].
+    /// The leaf met, or [`Ray::NOWHERE`].
     pub(super) leaf: u32,
     /// Index of the point that it starts from.
     pub(super) point: u32,
+}
+
+impl Ray {
+    /// The leaf of a ray that meets nothing, or a black back.
+    pub(super) const NOWHERE: u32 = u32::MAX;
 }
 
 /// A point that gathers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Point {
     /// Element coordinates.
-    at: [f64; 2],
-    key: u64,
+    pub(super) at: [f64; 2],
+    /// Key of its directions.
+    pub(super) key: u64,
 }
 
 /// An element that gathers.
@@ -81,6 +83,9 @@ impl Draw {
 }
 
 impl Gather {
+    /// Most points of an element.
+    pub(super) const MOST_POINTS: usize = 64;
+
     /// At a point in each of 16 (or, if not `fine`, 4) equal parts, without samples.
     pub(super) fn new(forest: &Forest, node: NodeId, fine: bool) -> Self {
         let cell = forest.node(node).cell;
@@ -101,6 +106,22 @@ impl Gather {
     /// Whether none of its points is inside of something.
     pub(super) fn is_whole(&self) -> bool {
         self.lit.iter().all(|l| *l)
+    }
+
+    /// Of known parts: samples of the first half (those that iterations use, the others) and of the second.
+    pub(super) fn of_parts(node: NodeId, points: Vec<Point>, lit: Vec<bool>, drawn: u32, parts: [Vec<Ray>; 4]) -> Self {
+        let [a, b, c, d] = parts;
+        Gather { node, points, lit, drawn, first: [a, c], others: [b, d], order: 1, fit: Vec::new() }
+    }
+
+    /// Its samples, as [`Gather::of_parts`] takes them.
+    pub(super) fn parts(&self) -> [&[Ray]; 4] {
+        [&self.first[0], &self.others[0], &self.first[1], &self.others[1]]
+    }
+
+    /// Its points, and whether they are not inside of something.
+    pub(super) fn marked_points(&self) -> impl Iterator<Item = (&Point, bool)> {
+        self.points.iter().zip(self.lit.iter().copied())
     }
 
     /// Samples of both halves.
@@ -279,7 +300,7 @@ impl Gather {
     /// What the first samples gather, as coefficients.
     pub(super) fn gather(&self, radiosity: &Field<'_>, out: &mut [[f64; 3]]) {
         let basis = radiosity.forest.basis_of(self.node);
-        let mut values = [[0.0; 3]; MOST_POINTS];
+        let mut values = [[0.0; 3]; Gather::MOST_POINTS];
         let values = &mut values[..self.points.len()];
         for half in 0..2 {
             self.values(radiosity, half, false, values);
@@ -293,7 +314,7 @@ impl Gather {
         let basis = radiosity.forest.basis_of(self.node);
         let n = basis.len();
         let points = self.points.len();
-        let mut values = [[[0.0; 3]; MOST_POINTS]; 2];
+        let mut values = [[[0.0; 3]; Gather::MOST_POINTS]; 2];
         let mut fits = [[[0.0; 3]; MOST]; 2];
         for half in 0..2 {
             let own = &mut values[half][..points];
@@ -424,7 +445,7 @@ pub(super) fn cast(kernel: &LightKernel, forest: &Forest, gather: &Gather, draw:
         for (rays, half) in rays.iter_mut().zip([0u64, 1]) {
             let key = seed::combine(point.key, half);
             for index in draw.directions.clone() {
-                let nowhere = Ray { to: [0.0; 2], leaf: NOWHERE, point: p };
+                let nowhere = Ray { to: [0.0; 2], leaf: Ray::NOWHERE, point: p };
                 if covered {
                     rays.push(nowhere);
                     continue;
@@ -451,7 +472,7 @@ pub(super) fn cast(kernel: &LightKernel, forest: &Forest, gather: &Gather, draw:
 /// Follows rays whose leaf was split since.
 fn relocate(forest: &Forest, rays: &mut [Ray]) {
     for ray in rays {
-        if ray.leaf == NOWHERE {
+        if ray.leaf == Ray::NOWHERE {
             continue;
         }
         let mut id = NodeId(ray.leaf);
@@ -510,7 +531,7 @@ impl<'a> Field<'a> {
 
     /// What a ray meets.
     fn met(&self, ray: &Ray) -> [f64; 3] {
-        if ray.leaf == NOWHERE {
+        if ray.leaf == Ray::NOWHERE {
             return [0.0; 3];
         }
         let [s, t] = ray.to.map(f64::from);

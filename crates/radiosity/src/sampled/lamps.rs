@@ -1,6 +1,7 @@
 //! The emitters as a receiver sees them: which of them matter to an element, what may stand between, and what they
 //! bring to a point.
 
+use super::kept::Kept;
 use super::sphere::Cone;
 use crate::form_factor::{Polygon, point_to_polygon};
 use crate::kernel::{Element, LightKernel};
@@ -54,6 +55,15 @@ pub(super) struct Lamps {
     worthy: f64,
 }
 
+impl Lamp {
+    fn new(scene: &Scene, kernel: &LightKernel, side: usize, group: usize, groups: &[(u32, Rgb)]) -> Self {
+        let element = kernel.element(&Cell::root(side as u32, kernel.sides()[side].shape));
+        let (centre, radius) = element.ball();
+        let (polygon, power) = (element.polygon(), groups[group].1.sum());
+        Lamp { side, patch: scene.sides[side].patch, group, power, element, polygon, centre, radius }
+    }
+}
+
 /// What stands between an element and a lamp.
 #[derive(Clone, Debug)]
 enum Between {
@@ -83,33 +93,55 @@ impl Lamps {
     /// The emitters of a scene; `error` is promised.
     pub(super) fn of(scene: &Scene, kernel: &LightKernel, error: f64) -> Self {
         let groups = strongest(scene);
-        let mut lamps = Vec::new();
-        for (side, frame) in scene.sides.iter().enumerate() {
-            let material = scene.patches[frame.patch as usize].material;
-            let exitance = scene.materials[material as usize].radiance * std::f64::consts::PI;
-            let Some(group) = groups.iter().position(|g| g.0 == material) else { continue };
-            let shape = kernel.sides()[side].shape;
-            let element = kernel.element(&Cell::root(side as u32, shape));
-            let (centre, radius) = element.ball();
-            let polygon = element.polygon();
-            lamps.push(Lamp {
-                side,
-                patch: frame.patch,
-                group,
-                power: exitance.sum(),
-                element,
-                polygon,
-                centre,
-                radius,
-            });
-        }
+        let group_of = |side: usize| {
+            let material = scene.patches[scene.sides[side].patch as usize].material;
+            groups.iter().position(|g| g.0 == material)
+        };
+        let mut lamps: Vec<Lamp> = (0..scene.sides.len())
+            .filter_map(|side| Some(Lamp::new(scene, kernel, side, group_of(side)?, &groups)))
+            .collect();
         let strength = |l: &Lamp| l.power * l.element.area();
         lamps.sort_by(|a, b| strength(b).total_cmp(&strength(a)).then(a.side.cmp(&b.side)));
         lamps.truncate(MOST_LAMPS);
+        Lamps::with(scene, groups, lamps, error)
+    }
+
+    /// The emitters that a solution knew, as they are now.
+    pub(super) fn restore(scene: &Scene, kernel: &LightKernel, error: f64, kept: &Kept) -> Self {
+        let groups: Vec<(u32, Rgb)> = kept.groups.iter().map(|&m| (m, exitance(scene, m as usize))).collect();
+        let lamp = |&side: &u32| {
+            let material = scene.patches[scene.sides[side as usize].patch as usize].material;
+            let group = groups.iter().position(|g| g.0 == material)?;
+            Some(Lamp::new(scene, kernel, side as usize, group, &groups))
+        };
+        let lamps = kept.lamps.iter().filter_map(lamp).collect();
+        let mut restored = Lamps::with(scene, groups, lamps, error);
+        restored.repaint(scene);
+        restored
+    }
+
+    fn with(scene: &Scene, groups: Vec<(u32, Rgb)>, lamps: Vec<Lamp>, error: f64) -> Self {
         let mut is_lamp = vec![false; scene.sides.len()];
         lamps.iter().for_each(|l| is_lamp[l.side] = true);
         let worthy = (WORTHY * error).clamp(WORTHY_LIMITS[0], WORTHY_LIMITS[1]);
         Lamps { lamps, groups, is_lamp, worthy }
+    }
+
+    /// Takes over what materials emit now. A lamp that is off keeps a little power in the choice of what is looked at,
+    /// so that it can be switched on again.
+    pub(super) fn repaint(&mut self, scene: &Scene) {
+        for (material, own) in &mut self.groups {
+            *own = exitance(scene, *material as usize);
+        }
+        let strongest = self.groups.iter().map(|g| g.1.sum()).fold(0.0, f64::max);
+        for lamp in &mut self.lamps {
+            lamp.power = self.groups[lamp.group].1.sum().max(1e-6 * strongest).max(f64::MIN_POSITIVE);
+        }
+    }
+
+    /// Their sides, in order.
+    pub(super) fn sides(&self) -> impl Iterator<Item = u32> {
+        self.lamps.iter().map(|l| l.side as u32)
     }
 
     /// Number of lamps.
@@ -284,6 +316,10 @@ impl Lamps {
     }
 }
 
+fn exitance(scene: &Scene, material: usize) -> Rgb {
+    scene.materials[material].radiance * std::f64::consts::PI
+}
+
 /// The emitting materials that give off most, with their exitances, in the order of materials.
 fn strongest(scene: &Scene) -> Vec<(u32, Rgb)> {
     let mut areas = vec![0.0; scene.materials.len()];
@@ -291,15 +327,14 @@ fn strongest(scene: &Scene) -> Vec<(u32, Rgb)> {
         let patch = &scene.patches[side.patch as usize];
         areas[patch.material as usize] += patch.area();
     }
-    let exitance = |m: usize| scene.materials[m].radiance * std::f64::consts::PI;
-    let mut found: Vec<usize> = (0..areas.len()).filter(|&m| exitance(m).sum() > 0.0).collect();
+    let mut found: Vec<usize> = (0..areas.len()).filter(|&m| exitance(scene, m).sum() > 0.0).collect();
     found.sort_by(|&a, &b| {
-        let power = |m: usize| exitance(m).sum() * areas[m];
+        let power = |m: usize| exitance(scene, m).sum() * areas[m];
         power(b).total_cmp(&power(a)).then(a.cmp(&b))
     });
     found.truncate(MOST_GROUPS);
     found.sort_unstable();
-    found.into_iter().map(|m| (m as u32, exitance(m))).collect()
+    found.into_iter().map(|m| (m as u32, exitance(scene, m))).collect()
 }
 
 /// A point of the unit square, folded onto a cell's domain.

@@ -12,10 +12,13 @@
 mod balance;
 mod direct;
 mod gather;
+mod kept;
 mod lamps;
 mod plan;
 mod sphere;
 mod stitch;
+
+pub use kept::Kept;
 
 use crate::kernel::LightKernel;
 use crate::rgb::Rgb;
@@ -73,10 +76,11 @@ pub(crate) struct Sampled {
     forest: Forest,
     /// Direct light for unit exitance: `[node][group][function]`.
     direct: Vec<f64>,
-    /// Mean absolute misfit of the direct light of each leaf, channels summed.
+    /// Mean absolute misfit of the direct light of each leaf, for unit exitance: `[node][group]`.
     misfit: Vec<f32>,
-    /// Scatter of the direct light of each leaf, where rays decide what is seen, and the rays a point.
+    /// Scatter of the direct light of each leaf, where rays decide what is seen, likewise.
     scatter: Vec<f32>,
+    /// Rays a point to the lamps that it may see past many things.
     rays: Vec<f32>,
     /// Share of each leaf that is not inside of something.
     lit: Vec<f32>,
@@ -130,8 +134,8 @@ impl Sampled {
         let (nodes, stride) = (forest.len(), forest.stride());
         Ok(Sampled {
             direct: vec![0.0; nodes * stride * lamps.groups.len()],
-            misfit: vec![0.0; nodes],
-            scatter: vec![0.0; nodes],
+            misfit: vec![0.0; nodes * lamps.groups.len()],
+            scatter: vec![0.0; nodes * lamps.groups.len()],
             lit: vec![1.0; nodes],
             rays: vec![LEAST_LAMP_RAYS; nodes],
             verdicts: vec![Verdict::default(); gathers.len()],
@@ -154,6 +158,10 @@ impl Sampled {
             error: f64::INFINITY,
             statistics: Statistics::default(),
         })
+    }
+
+    pub(crate) fn settings(&self) -> Settings {
+        self.settings
     }
 
     pub(crate) fn scene(&self) -> &Arc<Scene> {
@@ -212,8 +220,9 @@ impl Sampled {
             for g in 0..groups {
                 own[g * stride..g * stride + n].copy_from_slice(&fit.coefficients[g * n..(g + 1) * n]);
             }
-            self.misfit[id.index()] = fit.misfit as f32;
-            self.scatter[id.index()] = fit.scatter as f32;
+            let own = id.index() * groups..(id.index() + 1) * groups;
+            self.misfit[own.clone()].copy_from_slice(&fit.misfit);
+            self.scatter[own].copy_from_slice(&fit.scatter);
             self.lit[id.index()] = fit.lit as f32;
         }
         self.statistics.kernel_samples += count as u64;
@@ -242,8 +251,8 @@ impl Sampled {
             self.irradiance[id.index() * stride..(id.index() + 1) * stride].fill([0.0; 3]);
         }
         self.direct.resize(self.forest.len() * groups * stride, 0.0);
-        self.misfit.resize(self.forest.len(), 0.0);
-        self.scatter.resize(self.forest.len(), 0.0);
+        self.misfit.resize(self.forest.len() * groups, 0.0);
+        self.scatter.resize(self.forest.len() * groups, 0.0);
         self.lit.resize(self.forest.len(), 1.0);
         // smaller elements need fewer rays
         for &id in &fresh {
@@ -292,6 +301,19 @@ impl Sampled {
     }
 
     // ---- balance
+
+    /// What of the direct light of a leaf the functions cannot say, and its scatter: mean absolute values, channels
+    /// summed.
+    fn direct_error(&self, node: usize) -> (f64, f64) {
+        let groups = &self.lamps.groups;
+        let (mut misfit, mut square) = (0.0, 0.0);
+        for (g, (_, exitance)) in groups.iter().enumerate() {
+            let k = node * groups.len() + g;
+            misfit += exitance.sum() * f64::from(self.misfit[k]);
+            square += (exitance.sum() * f64::from(self.scatter[k])).powi(2);
+        }
+        (misfit, plan::MEAN_OF_SCATTER * square.sqrt())
+    }
 
     /// Direct light at the leaves.
     fn direct_light(&self) -> Vec<[f64; 3]> {

@@ -16,7 +16,7 @@ pub(super) const AIM: f64 = 0.95;
 /// Shares of the aim for direct misfit, scatter, and the gathering elements' misfit: their squares add up to about 1.
 const SHARES: [f64; 3] = [0.35, 0.72, 0.55];
 /// Mean absolute value of a scattered number, over its standard deviation.
-const MEAN_OF_SCATTER: f64 = 0.8;
+pub(super) const MEAN_OF_SCATTER: f64 = 0.8;
 /// Scatter falls with this power of the samples.
 const POWER: f64 = 0.7;
 /// Most directions of a point and half.
@@ -36,8 +36,9 @@ const MORE_LAMP_RAYS: f32 = 4.0;
 const MOST_LAMP_RAYS: f32 = 16_384.0;
 /// Deepest split.
 const DEEPEST: u32 = 16;
-/// Rounds after which every round aims lower, so that what is nearly good enough soon is.
+/// Rounds after which every round aims lower by as much as is missing; earlier, if no more than this factor is.
 const PATIENT_ROUNDS: u32 = 3;
+const NEARLY: f64 = 0.65;
 /// Rounds after which nothing more is hoped for.
 const MOST_ROUNDS: u32 = 40;
 
@@ -55,8 +56,9 @@ impl Sampled {
             self.stalled = true;
             self.phase = Phase::Finished;
         } else {
-            if self.rounds > PATIENT_ROUNDS {
-                self.aim *= 0.85;
+            let missing = self.settings.error / self.error;
+            if self.rounds > PATIENT_ROUNDS || self.rounds > 1 && missing > NEARLY {
+                self.aim *= missing.clamp(NEARLY, 0.95);
             }
             self.spend();
         }
@@ -88,9 +90,8 @@ impl Sampled {
                     local[node.first_child as usize + c] += local[n];
                 }
             } else {
-                let direct = f64::from(self.misfit[n]);
+                let (direct, scatter) = self.direct_error(n);
                 let area = node.measure * f64::from(self.lit[n]);
-                let scatter = MEAN_OF_SCATTER * f64::from(self.scatter[n]);
                 together += area * direct.hypot(local[n].hypot(scatter));
             }
         }
@@ -160,7 +161,7 @@ impl Sampled {
         let mut total = 0.0;
         for (n, node) in self.forest.nodes().iter().enumerate() {
             if node.first_child == 0 && self.counts(node.cell.root) {
-                let missed = node.measure * f64::from(self.lit[n] * self.misfit[n]);
+                let missed = node.measure * f64::from(self.lit[n]) * self.direct_error(n).0;
                 total += missed;
                 if missed > 0.0 && node.cell.depth < DEEPEST {
                     worst.push((missed, n as u32));
@@ -188,10 +189,10 @@ impl Sampled {
         let mut worst: Vec<(f64, u32)> = Vec::new();
         let mut total = 0.0;
         for (n, node) in self.forest.nodes().iter().enumerate() {
-            if node.first_child == 0 && self.counts(node.cell.root) && self.scatter[n] > 0.0 {
-                let scatter = MEAN_OF_SCATTER * node.measure * f64::from(self.scatter[n]);
+            if node.first_child == 0 && self.counts(node.cell.root) {
+                let scatter = node.measure * self.direct_error(n).1;
                 total += scatter;
-                if self.rays[n] < MOST_LAMP_RAYS && split.binary_search(&NodeId(n as u32)).is_err() {
+                if scatter > 0.0 && self.rays[n] < MOST_LAMP_RAYS && split.binary_search(&NodeId(n as u32)).is_err() {
                     worst.push((scatter / f64::from(self.rays[n]), n as u32));
                 }
             }

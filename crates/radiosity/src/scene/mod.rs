@@ -16,11 +16,13 @@ mod draft;
 mod emitter;
 mod merge;
 mod polygon;
+mod repaint;
 pub mod samples;
 
 pub use describe::describe;
 pub use draft::{BuildOptions, DraftFace, LARGEST_COORDINATE, MOST_CORNERS, SMALLEST_DIAGONAL, SceneDraft, SceneError};
 pub use emitter::Emitter;
+pub use repaint::{Paint, PaintError};
 
 use crate::rgb::Rgb;
 use glam::DVec3;

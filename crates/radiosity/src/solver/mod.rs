@@ -7,7 +7,7 @@
 mod linked;
 
 use crate::sampled::Sampled;
-use crate::scene::Scene;
+use crate::scene::{Paint, Scene};
 use crate::settings::{Method, Settings};
 use crate::solution::Solution;
 use linked::Linked;
@@ -80,6 +80,15 @@ pub enum SolveError {
     /// The settings make no sense.
     #[error(transparent)]
     Settings(#[from] crate::settings::SettingsError),
+    /// A material cannot be painted so.
+    #[error(transparent)]
+    Paint(#[from] crate::scene::PaintError),
+    /// A solution without samples to go on from.
+    #[error(
+        "the solution of '{0}' did not keep its samples, so there is nothing to go on from: \
+         solve it again and keep them (ondelette light --keep-links)"
+    )]
+    NothingKept(String),
 }
 
 /// Steps from a scene to its light.
@@ -116,6 +125,59 @@ impl Solver {
         }))
     }
 
+    /// Goes on from a solution that kept its samples ([`Solver::into_kept`]): no ray is cast before the first
+    /// [`Event::Solved`].
+    ///
+    /// # Errors
+    /// [`SolveError::NothingKept`].
+    pub fn resume(solution: &Solution) -> Result<Self, SolveError> {
+        let engine = Sampled::resume(solution);
+        let engine = engine.ok_or_else(|| SolveError::NothingKept(solution.scene().name.clone()))?;
+        Ok(Solver(Engine::Sampled(Box::new(engine))))
+    }
+
+    /// Lights the scene anew: materials emit or reflect something else, the samples stay. The next [`Event::Solved`]
+    /// states the new error; steps after that spend the rays that are missing to the promise.
+    ///
+    /// **Cost** to that event some sweeps over the samples; no ray.
+    ///
+    /// # Errors
+    /// [`SolveError::Paint`], and [`SolveError::NothingKept`] with links. The solver is then as it was.
+    ///
+    /// ```
+    /// use ondelette_radiosity::{Event, Rgb, Settings, Solver, scene::{Paint, samples}};
+    /// let mut solver = Solver::new(samples::facing_squares(1.0), Settings::default())?;
+    /// while solver.step().is_some() {}
+    /// let mut again = Solver::resume(&solver.into_kept())?;
+    /// let lamp = again.scene().materials.iter().find(|m| m.radiance.sum() > 0.0).unwrap().clone();
+    /// again.relight(&[Paint::Emission(lamp.name, lamp.radiance * 2.0)])?;
+    /// while !matches!(again.step(), Some(Event::Solved { .. }) | None) {}
+    /// let twice = again.solution();
+    /// assert!((twice.mean_irradiance(0).0[0] - 2.0 * 0.199824895698387).abs() < 4e-3);
+    /// # Ok::<(), ondelette_radiosity::SolveError>(())
+    /// ```
+    pub fn relight(&mut self, paints: &[Paint]) -> Result<(), SolveError> {
+        match &mut self.0 {
+            Engine::Linked(engine) => Err(SolveError::NothingKept(engine.scene().name.clone())),
+            Engine::Sampled(engine) => Ok(engine.paint(paints)?),
+        }
+    }
+
+    /// Promises another error (a fraction), for a solver that was resumed; it goes on from what it has.
+    ///
+    /// # Errors
+    /// The error is no fraction that can be promised; the solver has links.
+    pub fn promise(&mut self, error: f64) -> Result<(), SolveError> {
+        match &mut self.0 {
+            Engine::Linked(engine) => Err(SolveError::NothingKept(engine.scene().name.clone())),
+            Engine::Sampled(engine) => {
+                let settings = Settings { error, ..engine.settings() }.validated()?;
+                engine.promise(settings.error);
+                Ok(())
+            }
+        }
+    }
+
     /// The scene being solved.
     pub fn scene(&self) -> &Arc<Scene> {
         match &self.0 {
@@ -138,6 +200,15 @@ impl Solver {
         match &self.0 {
             Engine::Linked(engine) => engine.solution(),
             Engine::Sampled(engine) => engine.solution(),
+        }
+    }
+
+    /// The end, with the samples that [`Solver::resume`] goes on from; without, if it was stopped in the middle of a
+    /// refinement, or has links (which a solution always keeps).
+    pub fn into_kept(self) -> Solution {
+        match self.0 {
+            Engine::Linked(engine) => engine.into_solution(),
+            Engine::Sampled(engine) => engine.into_kept(),
         }
     }
 

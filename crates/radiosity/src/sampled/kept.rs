@@ -1,0 +1,259 @@
+//! What a solution keeps of its samples, so that it can be lit anew or refined without drawing them again.
+//!
+//! The samples of a row say where light comes from, not how much: another emission or reflectance changes nothing in
+//! them. Direct light is kept for unit exitance of every emitting material.
+
+use super::gather::{Gather, Point, Ray};
+use super::lamps::Lamps;
+use super::{Phase, Sampled, plan};
+use crate::kernel::LightKernel;
+use crate::scene::{Paint, PaintError, Scene};
+use crate::solution::Solution;
+use ondelette_compress::{Forest, NodeId};
+use std::sync::Arc;
+
+/// The samples behind a solution, as flat arrays: see [`Kept::check`] for what fits what.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Kept {
+    /// Materials whose lamps are known apart.
+    pub groups: Vec<u32>,
+    /// Sides that are lamps, strongest first.
+    pub lamps: Vec<u32>,
+    /// Direct light for unit exitance, `[node][group][function]`.
+    pub direct: Vec<f64>,
+    /// Mean absolute misfit of it, `[node][group]`.
+    pub misfit: Vec<f32>,
+    /// Root mean square scatter of it, likewise.
+    pub scatter: Vec<f32>,
+    /// Rays a point to lamps behind many things, a number a node.
+    pub lamp_rays: Vec<f32>,
+    /// Of each gathering element: node, points, directions drawn, samples of the first half (those that iterations use,
+    /// the others) and of the second.
+    pub gathers: Vec<[u32; 7]>,
+    /// Element coordinates of the points, element by element.
+    pub places: Vec<[f64; 2]>,
+    /// Keys of their directions.
+    pub keys: Vec<u64>,
+    /// Whether they are not inside of something: 0 or 1.
+    pub open: Vec<u8>,
+    /// Where samples arrive: leaf coordinates, by element, half, first and others.
+    pub ends: Vec<[f32; 2]>,
+    /// The leaf met, or 2^32 - 1 for none.
+    pub leaves: Vec<u32>,
+    /// The point that each starts from, counted in its element.
+    pub starts: Vec<u8>,
+}
+
+impl Kept {
+    /// Whether all of this fits a scene and its forest.
+    ///
+    /// # Errors
+    /// A sentence about the first thing that does not.
+    pub fn check(&self, scene: &Scene, forest: &Forest) -> Result<(), String> {
+        let (nodes, groups) = (forest.len(), self.groups.len());
+        let length = |name: &str, found: usize, wanted: usize| {
+            if found == wanted { Ok(()) } else { Err(format!("{found} {name} where {wanted} belong")) }
+        };
+        length("numbers of direct light", self.direct.len(), nodes * groups * forest.stride())?;
+        length("misfits", self.misfit.len(), nodes * groups)?;
+        length("scatters", self.scatter.len(), nodes * groups)?;
+        length("numbers of rays", self.lamp_rays.len(), nodes)?;
+        let all = |values: &[f32]| values.iter().all(|v| v.is_finite() && *v >= 0.0);
+        if !all(&self.misfit) || !all(&self.scatter) || !all(&self.lamp_rays) {
+            return Err("an error or a number of rays that is negative or no number".into());
+        }
+        if !self.direct.iter().all(|v| v.is_finite()) {
+            return Err("direct light that is no number".into());
+        }
+        if self.groups.iter().any(|&m| m as usize >= scene.materials.len()) {
+            return Err("a lamp's material that the scene does not have".into());
+        }
+        for &side in &self.lamps {
+            let known = scene
+                .sides
+                .get(side as usize)
+                .is_some_and(|s| self.groups.contains(&scene.patches[s.patch as usize].material));
+            if !known {
+                return Err(format!("side {side} as a lamp, whose material is none of a lamp"));
+            }
+        }
+        let (mut points, mut samples) = (0, 0);
+        let mut covered = vec![false; nodes];
+        for (k, record) in self.gathers.iter().enumerate() {
+            let [node, count, _, halves @ ..] = *record;
+            let wrong = |what: &str| Err(format!("gathering element {k} {what}"));
+            if node as usize >= nodes || std::mem::replace(&mut covered[node as usize], true) {
+                return wrong("stands at a node that is not there or has one");
+            }
+            if count == 0 || count as usize > Gather::MOST_POINTS {
+                return wrong(&format!("has {count} points"));
+            }
+            let own: u64 = halves.iter().map(|h| u64::from(*h)).sum();
+            let range = samples as usize..(samples + own).min(self.starts.len() as u64) as usize;
+            if self.starts[range].iter().any(|&s| u32::from(s) >= count) {
+                return wrong("has a sample that starts from no point");
+            }
+            points += u64::from(count);
+            samples += own;
+        }
+        length("points", self.places.len(), points as usize)?;
+        length("keys", self.keys.len(), points as usize)?;
+        length("marks of points", self.open.len(), points as usize)?;
+        length("ends", self.ends.len(), samples as usize)?;
+        length("leaves", self.leaves.len(), samples as usize)?;
+        length("starts", self.starts.len(), samples as usize)?;
+        if self.places.iter().flatten().any(|x| !(0.0..=1.0).contains(x)) || self.open.iter().any(|o| *o > 1) {
+            return Err("a point outside of its element".into());
+        }
+        if self.ends.iter().flatten().any(|x| !(-1.0..=2.0).contains(x)) {
+            return Err("a sample that ends outside of its leaf".into());
+        }
+        let is_end = |l: u32| l == Ray::NOWHERE || (l as usize) < nodes && forest.is_leaf(NodeId(l));
+        if !self.leaves.iter().all(|&l| is_end(l)) {
+            return Err("a sample that ends at no leaf".into());
+        }
+        // every leaf is below one gathering element and no more
+        for (n, node) in forest.nodes().iter().enumerate().filter(|(_, node)| node.first_child == 0) {
+            let (mut above, mut id) = (0, n);
+            loop {
+                above += usize::from(covered[id]);
+                let parent = forest.nodes()[id].parent.index();
+                if forest.nodes()[id].cell.depth == 0 || parent >= id {
+                    break;
+                }
+                id = parent;
+            }
+            if above != 1 {
+                return Err(format!("{above} gathering elements over leaf {n} of side {}", node.cell.root));
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Sampled {
+    /// The end, with the samples: none if it was stopped where elements are not fitted yet.
+    pub(crate) fn into_kept(mut self) -> Solution {
+        let whole =
+            matches!(self.phase, Phase::Finished | Phase::Solving(_) | Phase::Sweeping(_) | Phase::Spreading(_));
+        if !whole {
+            return self.into_solution();
+        }
+        let mut kept = Kept {
+            groups: self.lamps.groups.iter().map(|g| g.0).collect(),
+            lamps: self.lamps.sides().collect(),
+            direct: std::mem::take(&mut self.direct),
+            misfit: std::mem::take(&mut self.misfit),
+            scatter: std::mem::take(&mut self.scatter),
+            lamp_rays: std::mem::take(&mut self.rays),
+            ..Kept::default()
+        };
+        for gather in std::mem::take(&mut self.gathers) {
+            gather.store(&mut kept);
+        }
+        self.into_solution().with_kept(Arc::new(kept))
+    }
+
+    /// Goes on from a solution that kept its samples; `None` if it has none.
+    pub(crate) fn resume(solution: &Solution) -> Option<Self> {
+        let kept = solution.kept()?;
+        let (scene, forest) = (solution.scene().clone(), solution.forest().clone());
+        let kernel = LightKernel::new(&scene);
+        let lamps = Lamps::restore(&scene, &kernel, solution.settings().error, kept);
+        let mut rays = 0;
+        let mut points = 0;
+        let gathers: Vec<Gather> =
+            kept.gathers.iter().map(|record| Gather::restore(kept, record, &mut points, &mut rays)).collect();
+        let stride = forest.stride();
+        let mut sampled = Sampled {
+            direct: kept.direct.clone(),
+            misfit: kept.misfit.clone(),
+            scatter: kept.scatter.clone(),
+            rays: kept.lamp_rays.clone(),
+            lit: solution.lit().to_vec(),
+            verdicts: vec![Default::default(); gathers.len()],
+            indirect: vec![[0.0; 3]; gathers.len() * stride],
+            irradiance: solution.coefficients().to_vec(),
+            gathers,
+            settings: solution.settings(),
+            kernel,
+            lamps,
+            forest,
+            phase: Phase::Finished,
+            counted_area: 0.0,
+            whole: 0.0,
+            corrections: 0,
+            aim: plan::AIM,
+            rounds: 0,
+            refitted: false,
+            stalled: false,
+            error: f64::INFINITY,
+            statistics: solution.statistics().clone(),
+            scene,
+        };
+        sampled.prepare();
+        sampled.begin_again();
+        Some(sampled)
+    }
+
+    /// Paints materials, and begins the balance again.
+    pub(crate) fn paint(&mut self, paints: &[Paint]) -> Result<(), PaintError> {
+        let mut scene = (*self.scene).clone();
+        for paint in paints {
+            scene.paint(paint)?;
+        }
+        self.lamps.repaint(&scene);
+        self.scene = Arc::new(scene);
+        self.begin_again();
+        Ok(())
+    }
+
+    /// Promises another error.
+    pub(crate) fn promise(&mut self, error: f64) {
+        self.settings.error = error;
+        self.begin_again();
+    }
+
+    fn begin_again(&mut self) {
+        let sides = self.scene.sides.iter().zip(self.kernel.sides());
+        let counted = sides.filter(|(side, _)| !self.scene.material(**side).is_pure_emitter());
+        self.counted_area = counted.map(|(_, frame)| frame.area).sum();
+        (self.aim, self.rounds, self.corrections) = (plan::AIM, 0, 0);
+        (self.refitted, self.stalled, self.error, self.whole) = (false, false, f64::INFINITY, 0.0);
+        self.start_sweeping();
+    }
+}
+
+impl Gather {
+    /// Appends itself to what is kept.
+    fn store(self, kept: &mut Kept) {
+        let parts = self.parts();
+        let [a, b, c, d] = parts.map(|rays| rays.len() as u32);
+        kept.gathers.push([self.node.0, self.points(), self.drawn, a, b, c, d]);
+        for (point, open) in self.marked_points() {
+            kept.places.push(point.at);
+            kept.keys.push(point.key);
+            kept.open.push(u8::from(open));
+        }
+        for ray in parts.into_iter().flatten() {
+            kept.ends.push(ray.to);
+            kept.leaves.push(ray.leaf);
+            kept.starts.push(ray.point as u8);
+        }
+    }
+
+    /// The element of a record, whose points and samples begin at `point` and `sample`, which move on.
+    fn restore(kept: &Kept, record: &[u32; 7], point: &mut usize, sample: &mut usize) -> Gather {
+        let [node, count, drawn, halves @ ..] = *record;
+        let own = *point..*point + count as usize;
+        *point = own.end;
+        let points = own.clone().map(|p| Point { at: kept.places[p], key: kept.keys[p] }).collect();
+        let open = kept.open[own].iter().map(|o| *o == 1).collect();
+        let parts = halves.map(|count| -> Vec<Ray> {
+            let own = *sample..*sample + count as usize;
+            *sample = own.end;
+            own.map(|k| Ray { to: kept.ends[k], leaf: kept.leaves[k], point: u32::from(kept.starts[k]) }).collect()
+        });
+        Gather::of_parts(NodeId(node), points, open, drawn, parts)
+    }
+}
