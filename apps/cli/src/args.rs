@@ -30,6 +30,8 @@ pub(crate) struct Args {
 pub(crate) enum Command {
     /// Light a scene
     Light(LightArgs),
+    /// Light a solved scene anew: other emissions, other reflectances, a finer error
+    Relight(RelightArgs),
     /// Irradiance and radiosity at points of a solved scene
     Probe(ProbeArgs),
     /// Check a solution's promised error by independent random paths
@@ -84,9 +86,24 @@ pub(crate) struct LightArgs {
     #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     pub(crate) max_time: Option<String>,
 
+    /// Keep in the .onl file what `ondelette relight` goes on from: the samples of the transport operator
+    #[arg(long)]
+    pub(crate) keep_links: bool,
+
+    /// Most memory for elements and samples: 512MB, 2GB. Samples that do not fit are drawn again whenever they are read
+    /// (the scene and its ray structure come on top; see the report)
+    #[arg(long, value_name = "SIZE", allow_hyphen_values = true)]
+    pub(crate) memory: Option<String>,
+
     /// Number of threads; the result does not depend on it [default: one a processor]
     #[arg(long, value_name = "N", allow_hyphen_values = true)]
     pub(crate) threads: Option<String>,
+
+    /// Add a lamp: a rectangular panel, in the coordinates of the scene; may be repeated.
+    /// at=x,y,z:size=w,d:radiance=r,g,b:facing=x,y,z (one number for grey; facing: 0,-1,0 unless given, down where y is
+    /// up)
+    #[arg(long = "light", value_name = "PANEL", allow_hyphen_values = true)]
+    pub(crate) lights: Vec<String>,
 
     /// Let both sides of every surface of an OBJ file reflect and emit (glTF files say so a material: doubleSided)
     #[arg(long)]
@@ -99,6 +116,59 @@ pub(crate) struct LightArgs {
 
     /// Write the report here: seconds per stage, elements, links, rays, iterations, error, energy ledger, memory,
     /// settings
+    #[arg(long, value_name = "PATH")]
+    pub(crate) report: Option<PathBuf>,
+}
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  ondelette light room.glb --keep-links -o room.onl
+  ondelette relight room.onl --emission lamp=0,0,0 -o evening.png
+  ondelette relight room.onl --reflectance wall=0.8,0.75,0.7 --refine --error 1% -o repainted.onl -o repainted.glb
+
+Without --refine no ray is cast: the new error is stated, and the exit code is 1 if it is above the promise.")]
+pub(crate) struct RelightArgs {
+    /// Solution file of `ondelette light --keep-links -o NAME.onl`
+    #[arg(value_name = "SOLUTION.onl")]
+    pub(crate) solution: PathBuf,
+
+    /// Another emitted radiance for a material: MATERIAL=r,g,b or MATERIAL=grey; may be repeated
+    #[arg(long, value_name = "MATERIAL=RGB")]
+    pub(crate) emission: Vec<String>,
+
+    /// Another diffuse reflectance for a material, from 0 to below 1; may be repeated
+    #[arg(long, value_name = "MATERIAL=RGB")]
+    pub(crate) reflectance: Vec<String>,
+
+    /// Spend the rays that are missing to the promised error
+    #[arg(long)]
+    pub(crate) refine: bool,
+
+    /// Promise another error than the solution did: 1%, 0.5
+    #[arg(long, value_name = "PERCENT", allow_hyphen_values = true)]
+    pub(crate) error: Option<String>,
+
+    /// What to write; may be repeated: .glb .png .exr .csv .onl as for `ondelette light`
+    #[arg(short = 'o', long = "output", value_name = "PATH", required = true)]
+    pub(crate) outputs: Vec<PathBuf>,
+
+    /// Keep the samples in the .onl file that is written
+    #[arg(long)]
+    pub(crate) keep_links: bool,
+
+    /// Stop refining after this time: 10s, 2m, 500ms
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
+    pub(crate) max_time: Option<String>,
+
+    /// Number of threads; the result does not depend on it [default: one a processor]
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    pub(crate) threads: Option<String>,
+
+    /// Where pictures are taken from: eye=x,y,z:at=x,y,z:fov=40
+    #[arg(long, value_name = "CAMERA", allow_hyphen_values = true)]
+    pub(crate) camera: Option<String>,
+
+    /// Write the report here
     #[arg(long, value_name = "PATH")]
     pub(crate) report: Option<PathBuf>,
 }

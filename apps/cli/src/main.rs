@@ -31,6 +31,7 @@ fn main() -> ExitCode {
 fn dispatch(command: Command) -> Result<Outcome, Refusal> {
     match command {
         Command::Light(args) => run::light::run(plan::light::LightPlan::new(&args)?),
+        Command::Relight(args) => run::relight::run(plan::light::RelightPlan::new(&args)?),
         Command::Probe(args) => run::probe::run(&args),
         Command::Verify(args) => run::verify::run(&args),
         Command::Info(args) => run::info::run(&args),

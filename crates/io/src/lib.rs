@@ -10,4 +10,4 @@ mod read;
 pub mod shape;
 pub mod write;
 
-pub use read::{ENDINGS, ReadError, ReadOptions, builtin, read_scene};
+pub use read::{ENDINGS, Panel, ReadError, ReadOptions, builtin, read_scene};

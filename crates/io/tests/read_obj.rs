@@ -49,7 +49,7 @@ fn the_seed_room_is_read_whole() {
 fn two_sided_doubles_the_sides() {
     let path = Path::new(SEEDS).join("room.obj");
     let one = read_scene(&path, &ReadOptions::default()).unwrap();
-    let two = read_scene(&path, &ReadOptions { two_sided: true }).unwrap();
+    let two = read_scene(&path, &ReadOptions { two_sided: true, ..ReadOptions::default() }).unwrap();
     assert_eq!(one.sides.len(), one.patches.len());
     assert_eq!(two.sides.len(), 2 * two.patches.len());
 }

@@ -163,3 +163,88 @@ proptest! {
         }
     }
 }
+
+fn kept_sample() -> &'static [u8] {
+    static BYTES: OnceLock<Vec<u8>> = OnceLock::new();
+    BYTES.get_or_init(|| {
+        let mut solver = Solver::new(corner(), Settings { error: 0.2, ..Settings::default() }).unwrap();
+        while solver.step().is_some() {}
+        solution_bytes(&solver.into_kept())
+    })
+}
+
+#[test]
+fn kept_samples_survive_the_disk_and_are_gone_on_from() {
+    let back = open(kept_sample().to_vec()).unwrap();
+    assert_eq!(solution_bytes(&back), kept_sample());
+    let mut solver = Solver::resume(&back).unwrap();
+    while !matches!(solver.step(), Some(ondelette_radiosity::Event::Solved { .. }) | None) {}
+    let again = solver.solution();
+    assert_eq!(again.statistics().rays, back.statistics().rays);
+    for side in 0..back.scene().sides.len() {
+        let [a, b] = [&back, &again].map(|s| s.mean_irradiance(side).sum());
+        assert!((a - b).abs() <= 0.01 * (a + b) + 1e-9, "side {side}: {a} and {b}");
+    }
+    assert!(Solver::resume(&open(sample().to_vec()).unwrap()).is_err());
+}
+
+/// The kept sample with one chunk changed, checksums right.
+fn forged(chunk: &str, change: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
+    let file = ChunkFile::from_bytes("test.onl".as_ref(), kept_sample().to_vec()).unwrap();
+    let mut writer = ChunkWriter::new();
+    let mut change = Some(change);
+    for name in file.names() {
+        let mut bytes = file.bytes(name).unwrap().to_vec();
+        if name == chunk
+            && let Some(change) = change.take()
+        {
+            change(&mut bytes);
+        }
+        writer.add_bytes(name, bytes);
+    }
+    writer.to_bytes()
+}
+
+#[test]
+fn kept_samples_that_cannot_be_are_refused() {
+    for chunk in ["k.groups", "k.lamps", "k.gather", "k.leaves"] {
+        // an index far out of range
+        let bytes = forged(chunk, |b| b[..4].copy_from_slice(&0x00ff_ffffu32.to_le_bytes()));
+        assert!(open(bytes).is_err(), "{chunk}");
+    }
+    for chunk in ["k.direct", "k.misfit", "k.scattr", "k.lrays", "k.places", "k.ends"] {
+        let bytes = forged(chunk, |b| b.iter_mut().take(8).for_each(|b| *b = 0xff));
+        assert!(open(bytes).is_err(), "{chunk} with a NaN");
+    }
+    for chunk in ["k.direct", "k.misfit", "k.gather", "k.keys", "k.open", "k.starts", "k.leaves"] {
+        let bytes = forged(chunk, |b| b.truncate(b.len() / 2 / 28 * 28));
+        assert!(open(bytes).is_err(), "half of {chunk}");
+    }
+    assert!(open(forged("k.starts", |b| b[0] = 255)).is_err());
+    assert!(open(forged("k.open", |b| b[0] = 2)).is_err());
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(300))]
+    #[test]
+    fn whatever_kept_samples_say_nothing_panics(
+        which in 0usize..13, at in any::<prop::sample::Index>(), with in any::<[u8; 4]>(),
+    ) {
+        const NAMES: [&str; 13] = [
+            "k.groups", "k.lamps", "k.direct", "k.misfit", "k.scattr", "k.lrays", "k.gather", "k.places", "k.keys",
+            "k.open", "k.ends", "k.leaves", "k.starts",
+        ];
+        let bytes = forged(NAMES[which], |b| {
+            let at = at.index(b.len().saturating_sub(4).max(1));
+            for (b, w) in b[at..].iter_mut().zip(with) {
+                *b = w;
+            }
+        });
+        if let Ok(solution) = open(bytes) {
+            let mut solver = Solver::resume(&solution).unwrap();
+            for _ in 0..3 {
+                solver.step();
+            }
+        }
+    }
+}

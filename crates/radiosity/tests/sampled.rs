@@ -4,8 +4,8 @@ use glam::DVec3;
 use ondelette_numerics::par;
 use ondelette_radiosity::ledger::Ledger;
 use ondelette_radiosity::probe::Prober;
-use ondelette_radiosity::scene::samples;
-use ondelette_radiosity::{Basis, Event, Method, Rgb, Scene, Settings, Solution, Solver};
+use ondelette_radiosity::scene::{Paint, samples};
+use ondelette_radiosity::{Basis, Event, Method, Rgb, Scene, Settings, Solution, SolveError, Solver};
 
 fn solve(scene: Scene, basis: &str, error: f64) -> Solution {
     let basis: Basis = basis.parse().unwrap();
@@ -170,4 +170,130 @@ fn every_basis_lights_a_room() {
         let mean = solve(scene, basis, 0.1).mean_irradiance(1).0[0];
         assert!((mean / 0.317 - 1.0).abs() < 0.1, "{basis}: {mean}");
     }
+}
+
+/// Steps to the next estimate of the error.
+fn balance(solver: &mut Solver) {
+    while !matches!(solver.step(), Some(Event::Solved { .. }) | None) {}
+}
+
+#[test]
+fn relighting_casts_no_ray_and_gives_what_a_fresh_solve_gives() {
+    let settings = Settings { error: 0.01, ..Settings::default() };
+    let scene = samples::cube(0.6, [3.0, 0.0, 0.5, 0.0, 0.0, 1.0]);
+    let paints = [
+        Paint::Emission(scene.materials[0].name.clone(), Rgb::new(0.0, 1.0, 2.0)),
+        Paint::Reflectance(scene.materials[2].name.clone(), Rgb::new(0.1, 0.5, 0.8)),
+        // this one did not shine before
+        Paint::Emission(scene.materials[1].name.clone(), Rgb::grey(0.2)),
+    ];
+    let mut painted = scene.clone();
+    paints.iter().for_each(|p| painted.paint(p).unwrap());
+    let fresh = solve(painted, "m2", 0.003);
+
+    let mut first = Solver::new(scene, settings).unwrap();
+    while first.step().is_some() {}
+    let kept = first.into_kept();
+    let rays = kept.statistics().rays;
+    let mut again = Solver::resume(&kept).unwrap();
+    again.relight(&paints).unwrap();
+    balance(&mut again);
+    let relit = again.solution();
+    assert_eq!(relit.statistics().rays, rays);
+    let stated = relit.statistics().estimated_error;
+    assert!(stated < 0.05, "{stated}");
+    let (mut missed, mut whole) = (0.0, 0.0);
+    for side in 0..6 {
+        missed +=
+            (relit.mean_irradiance(side) + fresh.mean_irradiance(side) * -1.0).0.map(f64::abs).iter().sum::<f64>();
+        whole += fresh.mean_irradiance(side).sum();
+    }
+    assert!(missed <= (stated + 0.003) * whole, "{missed} of {whole}, stated {stated}");
+
+    // and with the missing rays it keeps a finer promise
+    again.promise(0.005).unwrap();
+    while again.step().is_some() {}
+    assert!(again.solution().is_finished() && again.solution().statistics().rays > rays);
+}
+
+#[test]
+fn a_light_that_is_switched_off_and_on_again_is_as_it_was() {
+    let scene = samples::quads("box", &room_with_box(0.0));
+    let lamp = scene.materials.iter().find(|m| m.radiance.sum() > 0.0).unwrap().clone();
+    let mut solver = Solver::new(scene, Settings { error: 0.03, ..Settings::default() }).unwrap();
+    while solver.step().is_some() {}
+    let mut again = Solver::resume(&solver.into_kept()).unwrap();
+    balance(&mut again);
+    let before = again.solution().mean_irradiance(1);
+    again.relight(&[Paint::Emission(lamp.name.clone(), Rgb::BLACK)]).unwrap();
+    balance(&mut again);
+    assert_eq!(again.solution().mean_irradiance(1), Rgb::BLACK);
+    again.relight(&[Paint::Emission(lamp.name, lamp.radiance)]).unwrap();
+    balance(&mut again);
+    assert!((again.solution().mean_irradiance(1).sum() / before.sum() - 1.0).abs() < 1e-6);
+}
+
+#[test]
+fn a_cap_on_memory_is_kept_and_the_promise_too() {
+    let scene = || samples::quads("box", &room_with_box(0.0));
+    let settings = Settings { error: 0.01, ..Settings::default() };
+    let free = solve(scene(), "m2", 0.01);
+    let mut solver = Solver::new(scene(), settings).unwrap();
+    assert!(matches!(solver.limit_memory(1000), Err(SolveError::Memory { .. })));
+    let cap = 6_000_000;
+    solver.limit_memory(cap).unwrap();
+    let mut most = 0;
+    while solver.step().is_some() {
+        most = most.max(solver.counted_bytes().unwrap());
+    }
+    assert!(most <= cap, "{most}");
+    let capped = solver.into_solution();
+    assert!(capped.is_finished());
+    for side in 0..free.scene().sides.len() {
+        let [a, b] = [&free, &capped].map(|s| s.mean_irradiance(side).sum());
+        assert!((a - b).abs() <= 0.01 * (a + b) + 1e-9, "side {side}: {a} and {b}");
+    }
+    // without the cap it takes more
+    let mut solver = Solver::new(scene(), settings).unwrap();
+    while solver.step().is_some() {}
+    assert!(solver.counted_bytes().unwrap() > cap);
+}
+
+#[test]
+fn slats_in_step_with_the_elements_are_seen() {
+    // 64 slats over a floor, as wide as the gaps between them, in the light of a large panel right above
+    let mut faces = vec![
+        ([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]], Rgb::grey(0.0), Rgb::BLACK),
+        ([[0.0, 0.0, 2.0], [0.0, 1.0, 2.0], [1.0, 1.0, 2.0], [1.0, 0.0, 2.0]], Rgb::BLACK, Rgb::grey(1.0)),
+    ];
+    for k in 0..64 {
+        let [a, b] = [0.25, 0.75].map(|o| (f64::from(k) + o) / 64.0);
+        faces.push(([[a, 0.0, 1e-4], [b, 0.0, 1e-4], [b, 1.0, 1e-4], [a, 1.0, 1e-4]], Rgb::BLACK, Rgb::BLACK));
+    }
+    let solution = solve(samples::quads("slats", &faces), "m2", 0.05);
+    let open = solve(samples::quads("floor", &faces[..2]), "m2", 0.01);
+    let share = solution.mean_irradiance(0).sum() / open.mean_irradiance(0).sum();
+    assert!((share - 0.5).abs() < 0.03, "{share}");
+}
+
+#[test]
+fn strong_reflections_of_a_spot_carry_their_scatter() {
+    // a small lamp close over the floor of a bright room: nearly all light has been reflected several times
+    let walls = samples::cube(0.9, [0.0; 6]);
+    let mut faces: Vec<_> = walls
+        .patches
+        .iter()
+        .map(|p| {
+            let corners = p.corners();
+            ([0, 1, 2, 3].map(|i| corners[i].to_array()), Rgb::grey(0.9), Rgb::BLACK)
+        })
+        .collect();
+    let low = walls.bounds[0];
+    let size = walls.bounds[1] - low;
+    let corner = |s: f64, t: f64| (low + size * DVec3::new(0.45 + 0.1 * s, 0.45 + 0.1 * t, 0.15)).to_array();
+    let lamp = [corner(0.0, 0.0), corner(0.0, 1.0), corner(1.0, 1.0), corner(1.0, 0.0)];
+    faces.push((lamp, Rgb::BLACK, Rgb::grey(1.0)));
+    let solution = solve(samples::quads("spot", &faces), "m2", 0.01);
+    let ledger = Ledger::count(&solution, 1 << 18);
+    assert!(ledger.closure().abs() < 0.012, "{}", ledger.closure());
 }

@@ -2,10 +2,12 @@
 
 use super::check_distinct;
 use super::values::{self, CameraRequest};
-use crate::args::LightArgs;
+use crate::args::{LightArgs, RelightArgs};
 use crate::run::Refusal;
+use ondelette_io::Panel;
 use ondelette_io::write::{check_writable, elements_path};
 use ondelette_radiosity::Settings;
+use ondelette_radiosity::scene::Paint;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -93,7 +95,12 @@ impl Outputs {
 pub(crate) struct LightPlan {
     pub(crate) scene: PathBuf,
     pub(crate) two_sided: bool,
+    pub(crate) panels: Vec<Panel>,
     pub(crate) settings: Settings,
+    /// Whether the samples go into the solution file.
+    pub(crate) keep: bool,
+    /// Bytes that elements and samples may take.
+    pub(crate) memory: Option<u64>,
     pub(crate) max_time: Option<Duration>,
     pub(crate) threads: Option<usize>,
     pub(crate) camera: Option<CameraRequest>,
@@ -122,13 +129,19 @@ impl LightPlan {
         let plan = LightPlan {
             scene: args.scene.clone(),
             two_sided: args.two_sided,
+            panels: args.lights.iter().map(|text| values::panel(text)).collect::<Result<_, _>>()?,
             settings,
+            keep: args.keep_links,
+            memory: args.memory.as_deref().map(values::memory).transpose()?,
             max_time: args.max_time.as_deref().map(values::duration).transpose()?,
             threads: args.threads.as_deref().map(values::threads).transpose()?,
             camera: args.camera.as_deref().map(values::camera).transpose()?,
             named,
             report: args.report.clone(),
         };
+        if plan.keep && !plan.named.iter().any(|o| o.kind == Kind::Solution) {
+            return Err(Refusal::new("--keep-links: samples are kept in a solution file; add -o NAME.onl"));
+        }
         Outputs { files: plan.named.clone(), report: plan.report.clone() }.check(&plan.scene)?;
         Ok(plan)
     }
@@ -160,5 +173,56 @@ impl LightPlan {
         folders.sort();
         folders.dedup();
         folders
+    }
+}
+
+/// A validated `ondelette relight`.
+#[derive(Clone, Debug)]
+pub(crate) struct RelightPlan {
+    /// What is common with lighting; its settings are those of the solution, once that is read.
+    pub(crate) light: LightPlan,
+    pub(crate) paints: Vec<Paint>,
+    pub(crate) refine: bool,
+    /// Another promise.
+    pub(crate) error: Option<f64>,
+}
+
+impl RelightPlan {
+    /// Judges every flag, and whether named outputs can be written.
+    pub(crate) fn new(args: &RelightArgs) -> Result<Self, Refusal> {
+        let mut named = args.outputs.iter().map(|path| Output::new(path)).collect::<Result<Vec<_>, _>>()?;
+        named.sort_by_key(|o| o.kind);
+        let emission = args
+            .emission
+            .iter()
+            .map(|text| values::painted("--emission", text).map(|(material, value)| Paint::Emission(material, value)));
+        let reflectance = args.reflectance.iter().map(|text| {
+            values::painted("--reflectance", text).map(|(material, value)| Paint::Reflectance(material, value))
+        });
+        let paints = emission.chain(reflectance).collect::<Result<Vec<_>, _>>()?;
+        let error = args.error.as_deref().map(values::percent).transpose()?;
+        if paints.is_empty() && error.is_none() && !args.refine {
+            return Err(Refusal::new(
+                "nothing to change: give --emission MATERIAL=r,g,b, --reflectance MATERIAL=r,g,b, or --refine --error 0.5%",
+            ));
+        }
+        let plan = LightPlan {
+            scene: args.solution.clone(),
+            two_sided: false,
+            panels: Vec::new(),
+            settings: Settings::default(),
+            keep: args.keep_links,
+            memory: None,
+            max_time: args.max_time.as_deref().map(values::duration).transpose()?,
+            threads: args.threads.as_deref().map(values::threads).transpose()?,
+            camera: args.camera.as_deref().map(values::camera).transpose()?,
+            named,
+            report: args.report.clone(),
+        };
+        if plan.keep && !plan.named.iter().any(|o| o.kind == Kind::Solution) {
+            return Err(Refusal::new("--keep-links: samples are kept in a solution file; add -o NAME.onl"));
+        }
+        Outputs { files: plan.named.clone(), report: plan.report.clone() }.check(&plan.scene)?;
+        Ok(RelightPlan { light: plan, paints, refine: args.refine, error })
     }
 }

@@ -40,7 +40,7 @@ pub(crate) fn run(plan: LightPlan) -> Result<Outcome, Refusal> {
 fn light(plan: &LightPlan, stop: Stop) -> Result<Outcome, Refusal> {
     let mut stages = Stages::start();
     let mut progress = Progress::new(plan.settings.error);
-    let scene = read_scene(&plan.scene, &ReadOptions { two_sided: plan.two_sided })?;
+    let scene = read_scene(&plan.scene, &ReadOptions { two_sided: plan.two_sided, panels: plan.panels.clone() })?;
     stages.end("read");
     if stop.signalled() {
         tell("stopped by Ctrl-C before anything was computed: nothing was written");
@@ -52,6 +52,9 @@ fn light(plan: &LightPlan, stop: Stop) -> Result<Outcome, Refusal> {
     let camera = camera.transpose()?;
 
     let mut solver = Solver::new(scene, plan.settings)?;
+    if let Some(bytes) = plan.memory {
+        solver.limit_memory(bytes)?;
+    }
     if plan.uses_default_folder() {
         create_folder(DEFAULT_FOLDER.as_ref())?;
     }
@@ -67,11 +70,30 @@ fn light(plan: &LightPlan, stop: Stop) -> Result<Outcome, Refusal> {
             None => break,
         }
     }
-    let solution = solver.into_solution();
     stages.end("solve");
+    let record = finish(plan, solver, stopped, stages, &outputs, camera, stop, progress)?;
+    Ok(record)
+}
+
+/// Everything after the solver's last step: files, ledger, picture, report, summary.
+#[allow(clippy::too_many_arguments)]
+pub(super) fn finish(
+    plan: &LightPlan,
+    solver: Solver,
+    stopped: Option<Reason>,
+    stages: Stages,
+    outputs: &Outputs,
+    camera: Option<Camera>,
+    stop: Stop,
+    mut progress: Progress,
+) -> Result<Outcome, Refusal> {
+    let solution = if plan.keep { solver.into_kept() } else { solver.into_solution() };
+    if plan.keep && solution.kept().is_none() {
+        tell("note: stopped in the middle of a refinement: the samples are not kept");
+    }
 
     let mut record = Record { plan, solution: &solution, ledger: None, stopped, stages, written: Vec::new() };
-    write_outputs(&mut record, &outputs, camera, stop, &mut progress)?;
+    write_outputs(&mut record, outputs, camera, stop, &mut progress)?;
     progress.finish();
     if let Some(path) = &outputs.report {
         record.written.push(path.clone());
@@ -158,7 +180,7 @@ fn draw(
     }
 }
 
-fn is_drawn(kind: Kind) -> bool {
+pub(super) fn is_drawn(kind: Kind) -> bool {
     matches!(kind, Kind::Picture | Kind::LinearPicture)
 }
 
@@ -192,7 +214,7 @@ fn remark(scene: &Scene, plan: &LightPlan) {
 }
 
 /// The camera asked for, else the file's, else one inside the scene.
-fn camera(scene: &Scene, asked: Option<CameraRequest>) -> Result<Camera, Refusal> {
+pub(super) fn camera(scene: &Scene, asked: Option<CameraRequest>) -> Result<Camera, Refusal> {
     let Some(CameraRequest { eye, at, up, fov }) = asked else {
         return Ok(scene.camera.unwrap_or_else(|| frame_from_inside(scene)));
     };

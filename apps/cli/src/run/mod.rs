@@ -6,6 +6,7 @@ pub(crate) mod fit;
 pub(crate) mod info;
 pub(crate) mod light;
 pub(crate) mod probe;
+pub(crate) mod relight;
 mod shape_input;
 mod shape_output;
 pub(crate) mod verify;

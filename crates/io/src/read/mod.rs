@@ -8,9 +8,11 @@ mod error;
 mod gltf;
 mod mtl;
 mod obj;
+mod panel;
 mod picture;
 
 pub use error::ReadError;
+pub use panel::Panel;
 
 use ondelette_radiosity::Scene;
 use ondelette_radiosity::scene::{BuildOptions, SceneDraft};
@@ -20,10 +22,12 @@ use std::path::Path;
 pub const ENDINGS: [&str; 3] = [".obj", ".gltf", ".glb"];
 
 /// How to read a scene file.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct ReadOptions {
     /// Treat every material as two-sided, whatever the file says.
     pub two_sided: bool,
+    /// Lamps that are added.
+    pub panels: Vec<Panel>,
 }
 
 /// Reads a scene: a file that ends in `.obj`, `.gltf` or `.glb` (in any case), or `builtin:NAME`.
@@ -44,11 +48,12 @@ pub struct ReadOptions {
 pub fn read_scene(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Scene, ReadError> {
     let path = path.as_ref();
     let build = BuildOptions { two_sided: options.two_sided };
-    let draft = if let Some(name) = path.to_str().and_then(|p| p.strip_prefix("builtin:")) {
+    let mut draft = if let Some(name) = path.to_str().and_then(|p| p.strip_prefix("builtin:")) {
         builtin::draft(name)?
     } else {
         read_draft(path)?
     };
+    panel::add(&mut draft, &options.panels);
     draft.build(build).map_err(|error| ReadError::Scene { path: path.into(), error })
 }
 

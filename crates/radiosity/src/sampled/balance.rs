@@ -9,7 +9,7 @@
 //! for the scatter, with signs drawn at random for the elements, a few times over.
 
 use super::gather::{self, Field, Verdict};
-use super::{Phase, Sampled, stitch};
+use super::{Phase, RAYS_A_STEP, Sampled, stitch};
 use crate::solver::Event;
 use ondelette_numerics::krylov::Gmres;
 use ondelette_numerics::{par, seed};
@@ -61,7 +61,8 @@ impl Sampled {
     pub(super) fn sweep(&mut self, mut sweep: Sweep) -> Event {
         let stride = self.forest.stride();
         let (mut count, mut reads) = (0, 0);
-        while sweep.done + count < self.gathers.len() && reads < READS_A_STEP {
+        let most = if self.streaming { RAYS_A_STEP } else { READS_A_STEP };
+        while sweep.done + count < self.gathers.len() && reads < most {
             reads += self.gathers[sweep.done + count].samples();
             count += 1;
         }
@@ -69,7 +70,10 @@ impl Sampled {
         let gathers = &self.gathers[sweep.done..sweep.done + count];
         let judged = par::map(count, |k| {
             let (mut out, mut apart) = (vec![[0.0; 3]; stride], vec![[0.0; 3]; stride]);
-            let verdict = gathers[k].judge(&field, &mut out, &mut apart);
+            let drawn_again = gathers[k]
+                .missing((sweep.done + k) as u32)
+                .map(|draw| gathers[k].completed(gather::cast(&self.kernel, &self.forest, &gathers[k], &draw)));
+            let verdict = drawn_again.as_ref().unwrap_or(&gathers[k]).judge(&field, &mut out, &mut apart);
             (verdict, out, apart)
         });
         for (k, (verdict, out, apart)) in (sweep.done..).zip(judged) {

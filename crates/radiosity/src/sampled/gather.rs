@@ -19,8 +19,6 @@ pub(super) const MOST: usize = 36;
 const FINE_POINTS: usize = 16;
 /// Directions that a usual element is as good as, before any is drawn.
 const FIRST_LOOK: f64 = 4.0;
-/// Directions of a point and half that iterations use; the last sweep uses all.
-const FIRST: u32 = 8;
 
 /// One sample of a row: where on a leaf it arrives.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,6 +74,12 @@ pub(super) struct Draw {
 }
 
 impl Draw {
+    /// The part of it that iterations use.
+    pub(super) fn early(&self) -> Draw {
+        let end = self.directions.end.min(Gather::FIRST).max(self.directions.start);
+        Draw { directions: self.directions.start..end, ..self.clone() }
+    }
+
     /// Rays of both halves.
     pub(super) fn rays(&self) -> usize {
         2 * self.points.len() * self.directions.len()
@@ -85,6 +89,8 @@ impl Draw {
 impl Gather {
     /// Most points of an element.
     pub(super) const MOST_POINTS: usize = 64;
+    /// Directions of a point and half that iterations use; sweeps use all.
+    pub(super) const FIRST: u32 = 8;
 
     /// At a point in each of 16 (or, if not `fine`, 4) equal parts, without samples.
     pub(super) fn new(forest: &Forest, node: NodeId, fine: bool) -> Self {
@@ -124,9 +130,14 @@ impl Gather {
         self.points.iter().zip(self.lit.iter().copied())
     }
 
-    /// Samples of both halves.
+    /// Samples of both halves, stored or not.
     pub(super) fn samples(&self) -> usize {
-        self.first.iter().chain(&self.others).map(Vec::len).sum()
+        2 * self.points.len() * self.drawn as usize
+    }
+
+    /// As if all its samples were stored, with those that are not in `cast`.
+    pub(super) fn completed(&self, cast: Cast) -> Gather {
+        Gather { others: cast.rays, ..self.clone() }
     }
 
     /// Points.
@@ -139,14 +150,27 @@ impl Gather {
         Draw { gather: gather as u32, points: 0..points, directions }
     }
 
+    /// Samples beyond the first that are not stored.
+    pub(super) fn missing(&self, gather: u32) -> Option<Draw> {
+        let stored = !self.others[0].is_empty() || self.drawn <= Self::FIRST;
+        let all = Draw { gather, points: 0..self.points(), directions: Self::FIRST..self.drawn };
+        if stored { None } else { Some(all) }
+    }
+
+    /// Forgets the samples beyond the first.
+    pub(super) fn forget_others(&mut self) {
+        self.others = Default::default();
+    }
+
     /// Takes drawn samples.
     pub(super) fn take(&mut self, draw: &Draw, cast: Cast) {
         for (p, open) in draw.points.clone().zip(cast.open) {
             self.lit[p as usize] |= open;
         }
-        let early = (FIRST.saturating_sub(draw.directions.start) as usize).min(draw.directions.len());
+        let early = (Self::FIRST.saturating_sub(draw.directions.start) as usize).min(draw.directions.len());
         for (h, rays) in cast.rays.into_iter().enumerate() {
-            for ray in rays.chunks(draw.directions.len()) {
+            let directions = rays.len() / draw.points.len().max(1);
+            for ray in rays.chunks(directions.max(1)) {
                 self.first[h].extend_from_slice(&ray[..early]);
                 self.others[h].extend_from_slice(&ray[early..]);
             }
@@ -277,7 +301,7 @@ impl Gather {
             }
         };
         add(&self.first[half]);
-        let mut directions = self.drawn.min(FIRST);
+        let mut directions = self.drawn.min(Self::FIRST);
         if all {
             add(&self.others[half]);
             directions = self.drawn;

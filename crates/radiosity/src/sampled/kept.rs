@@ -80,7 +80,7 @@ impl Kept {
         let (mut points, mut samples) = (0, 0);
         let mut covered = vec![false; nodes];
         for (k, record) in self.gathers.iter().enumerate() {
-            let [node, count, _, halves @ ..] = *record;
+            let [node, count, drawn, halves @ ..] = *record;
             let wrong = |what: &str| Err(format!("gathering element {k} {what}"));
             if node as usize >= nodes || std::mem::replace(&mut covered[node as usize], true) {
                 return wrong("stands at a node that is not there or has one");
@@ -88,10 +88,16 @@ impl Kept {
             if count == 0 || count as usize > Gather::MOST_POINTS {
                 return wrong(&format!("has {count} points"));
             }
+            // every point has all directions; those beyond the first may be left to be drawn again
+            let [first, others] = [drawn.min(Gather::FIRST), drawn.saturating_sub(Gather::FIRST)];
+            let right = |stored: u32| halves == [count * first, stored, count * first, stored];
+            if drawn > plan::MOST_DIRECTIONS as u32 || !(right(0) || right(count * others)) {
+                return wrong(&format!("has samples {halves:?} of {drawn} directions at {count} points"));
+            }
             let own: u64 = halves.iter().map(|h| u64::from(*h)).sum();
-            let range = samples as usize..(samples + own).min(self.starts.len() as u64) as usize;
-            if self.starts[range].iter().any(|&s| u32::from(s) >= count) {
-                return wrong("has a sample that starts from no point");
+            let range = samples as usize..(samples + own) as usize;
+            if self.starts.get(range).is_none_or(|starts| starts.iter().any(|&s| u32::from(s) >= count)) {
+                return wrong("has samples that start from no point, or too few");
             }
             points += u64::from(count);
             samples += own;
@@ -182,6 +188,8 @@ impl Sampled {
             phase: Phase::Finished,
             counted_area: 0.0,
             whole: 0.0,
+            cap: None,
+            streaming: kept.gathers.iter().any(|g| g[2] > Gather::FIRST && g[4] == 0),
             corrections: 0,
             aim: plan::AIM,
             rounds: 0,
@@ -220,6 +228,8 @@ impl Sampled {
         self.counted_area = counted.map(|(_, frame)| frame.area).sum();
         (self.aim, self.rounds, self.corrections) = (plan::AIM, 0, 0);
         (self.refitted, self.stalled, self.error, self.whole) = (false, false, f64::INFINITY, 0.0);
+        // from the dark: the same light, whatever was balanced before
+        self.indirect.fill([0.0; 3]);
         self.start_sweeping();
     }
 }

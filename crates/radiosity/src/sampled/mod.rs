@@ -14,6 +14,7 @@ mod direct;
 mod gather;
 mod kept;
 mod lamps;
+mod memory;
 mod plan;
 mod sphere;
 mod stitch;
@@ -93,6 +94,9 @@ pub(crate) struct Sampled {
     counted_area: f64,
     /// Integral of the irradiance over counted sides, channels summed; 0 before the first balance.
     whole: f64,
+    /// Counted bytes that elements and samples may take, and whether only the first samples are stored.
+    cap: Option<u64>,
+    streaming: bool,
     /// Solves of the present samples so far.
     corrections: u32,
     /// What share of the promise batches aim at.
@@ -150,6 +154,8 @@ impl Sampled {
             phase: Phase::Fitting { nodes: leaves, done: 0, draws },
             counted_area,
             whole: 0.0,
+            cap: None,
+            streaming: false,
             corrections: 0,
             aim: plan::AIM,
             rounds: 0,
@@ -273,7 +279,8 @@ impl Sampled {
         }
         let batch = &draws[done..done + count];
         let made = par::map(count, |i| {
-            gather::cast(&self.kernel, &self.forest, &self.gathers[batch[i].gather as usize], &batch[i])
+            let draw = if self.streaming { &batch[i].early() } else { &batch[i] };
+            gather::cast(&self.kernel, &self.forest, &self.gathers[draw.gather as usize], draw)
         });
         for (draw, rays) in batch.iter().zip(made) {
             self.gathers[draw.gather as usize].take(draw, rays);

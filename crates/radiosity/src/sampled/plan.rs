@@ -20,7 +20,7 @@ pub(super) const MEAN_OF_SCATTER: f64 = 0.8;
 /// Scatter falls with this power of the samples.
 const POWER: f64 = 0.7;
 /// Most directions of a point and half.
-const MOST_DIRECTIONS: f64 = 65_536.0;
+pub(super) const MOST_DIRECTIONS: f64 = 65_536.0;
 /// Most growth of an element's directions in a round.
 const GROWTH: f64 = 32.0;
 /// Mean absolute value of a misfit over its root mean square.
@@ -127,6 +127,9 @@ impl Sampled {
             let aim = self.aim * self.settings.error * self.whole / SAFETY;
             let leaves = self.worst_leaves(SHARES[0] * aim);
             let unclear = self.unclear_leaves(SHARES[0] * aim, &leaves);
+            if !leaves.is_empty() && self.make_room(&[]) {
+                return self.stop_for_memory();
+            }
             if !leaves.is_empty() || !unclear.is_empty() {
                 let mut nodes = self.split(&leaves);
                 nodes.extend(unclear);
@@ -136,6 +139,9 @@ impl Sampled {
             // children need direct light as well
             let (nodes, mut draws) = self.split_gathers(SHARES[2] * aim);
             draws.extend(self.draws(SHARES[1] * aim));
+            if self.make_room(&draws) {
+                return self.stop_for_memory();
+            }
             if !draws.is_empty() {
                 self.phase = Phase::Fitting { nodes, done: 0, draws };
                 return;

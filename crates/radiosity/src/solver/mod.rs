@@ -80,6 +80,20 @@ pub enum SolveError {
     /// The settings make no sense.
     #[error(transparent)]
     Settings(#[from] crate::settings::SettingsError),
+    /// Not even the coarsest state fits.
+    #[error(
+        "a memory of {cap} bytes is too small for this scene: elements and first samples alone take {least} bytes; \
+         allow more, or join small faces"
+    )]
+    Memory {
+        /// What is allowed.
+        cap: u64,
+        /// What it takes.
+        least: u64,
+    },
+    /// A cap where nothing is counted.
+    #[error("memory is capped with the sampled method only: leave --memory out, or choose --method sampled")]
+    NoMemoryCap,
     /// A material cannot be painted so.
     #[error(transparent)]
     Paint(#[from] crate::scene::PaintError),
@@ -160,6 +174,27 @@ impl Solver {
         match &mut self.0 {
             Engine::Linked(engine) => Err(SolveError::NothingKept(engine.scene().name.clone())),
             Engine::Sampled(engine) => Ok(engine.paint(paints)?),
+        }
+    }
+
+    /// Caps the counted bytes of elements, samples and working arrays (the scene and its ray structure come on top).
+    /// Samples that do not fit are drawn again whenever they are read: the answer stays within the promise, the time
+    /// grows. Where not even elements fit, the solver stops, and [`crate::Statistics::finished`] is false.
+    ///
+    /// # Errors
+    /// [`SolveError::Memory`] if the first elements alone take more; [`SolveError::NoMemoryCap`] with links.
+    pub fn limit_memory(&mut self, bytes: u64) -> Result<(), SolveError> {
+        match &mut self.0 {
+            Engine::Linked(_) => Err(SolveError::NoMemoryCap),
+            Engine::Sampled(engine) => engine.limit_memory(bytes),
+        }
+    }
+
+    /// Counted bytes of elements, samples and working arrays; nothing is counted with links.
+    pub fn counted_bytes(&self) -> Option<u64> {
+        match &self.0 {
+            Engine::Linked(_) => None,
+            Engine::Sampled(engine) => Some(engine.bytes()),
         }
     }
 
