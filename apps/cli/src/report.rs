@@ -112,6 +112,7 @@ impl Record<'_> {
             "iterations": statistics.iterations,
             "residual": known(statistics.residual),
             "estimated_error": known(statistics.estimated_error),
+            "surfaces": surfaces(solution),
             "ledger": self.ledger.as_ref().map(|ledger| {
                 let power = |p: Rgb| (p * square_metre(solution)).0;
                 json!({
@@ -197,6 +198,44 @@ impl Record<'_> {
         }
         Ok(())
     }
+}
+
+/// Objects that are listed with their errors.
+const LISTED: usize = 1000;
+
+/// Estimated errors by object: the largest first, as far as they are listed.
+fn surfaces(solution: &Solution) -> Value {
+    if solution.errors().is_empty() {
+        return Value::Null;
+    }
+    let scene = solution.scene();
+    // area, integral of the irradiance, integral of its error
+    let mut sums = vec![[0.0; 3]; scene.objects.len()];
+    let object = |side: usize| scene.patches[scene.sides[side].patch as usize].provenance.object as usize;
+    solution.each_leaf(|_, side, area, mean| {
+        let sum = &mut sums[object(side)];
+        sum[0] += area;
+        sum[1] += area * mean.sum();
+    });
+    for (side, error) in solution.errors().iter().enumerate() {
+        sums[object(side)][2] += error;
+    }
+    let whole: f64 = sums.iter().map(|s| s[2]).sum();
+    let mut order: Vec<usize> = (0..sums.len()).filter(|&o| sums[o][0] > 0.0).collect();
+    order.sort_by(|&a, &b| sums[b][2].total_cmp(&sums[a][2]).then(a.cmp(&b)));
+    let metres = square_metre(solution);
+    let ratio = |a: f64, b: f64| if b > 0.0 { json!(a / b) } else { Value::Null };
+    let listed = order.iter().take(LISTED).map(|&o| {
+        let [area, irradiance, error] = sums[o];
+        json!({
+            "name": scene.objects[o].name,
+            "area_square_metres": area * metres,
+            "mean_irradiance_rgb_sum": irradiance / area,
+            "estimated_error": ratio(error, irradiance),
+            "share_of_all_error": ratio(error, whole),
+        })
+    });
+    listed.collect()
 }
 
 /// Five significant digits.

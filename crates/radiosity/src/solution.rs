@@ -41,6 +41,8 @@ pub struct Solution {
     statistics: Statistics,
     /// Share of each node that is not inside of something.
     lit: Vec<f32>,
+    /// Estimated integral of the absolute error over each side, channels summed; empty if not known.
+    errors: Vec<f64>,
     /// The samples behind it.
     kept: Option<Arc<Kept>>,
 }
@@ -61,7 +63,7 @@ impl Solution {
         assert_eq!(irradiance.len(), forest.len() * forest.stride());
         assert_eq!(forest.roots().len(), scene.sides.len());
         let lit = vec![1.0; forest.len()];
-        Solution { scene, settings, forest, links, irradiance, statistics, lit, kept: None }
+        Solution { scene, settings, forest, links, irradiance, statistics, lit, errors: Vec::new(), kept: None }
     }
 
     /// Says which share of each leaf is not inside of something (a floor under a box): the rest is dark, and no part of
@@ -74,6 +76,23 @@ impl Solution {
         assert_eq!(lit.len(), self.forest.len());
         self.lit = lit;
         self
+    }
+
+    /// Says what error is estimated for each side: the integral of its absolute value, channels summed.
+    ///
+    /// # Panics
+    /// If there are errors, but not one a side.
+    #[must_use]
+    pub fn with_errors(mut self, errors: Vec<f64>) -> Self {
+        assert!(errors.is_empty() || errors.len() == self.scene.sides.len());
+        self.errors = errors;
+        self
+    }
+
+    /// Estimated integral of the absolute error of the irradiance over each side, channels summed; empty before the
+    /// first balance and with links. 0 for sides that the promise does not count.
+    pub fn errors(&self) -> &[f64] {
+        &self.errors
     }
 
     /// Adds the samples that relighting and refining go on from (see [`Kept::check`]).

@@ -7,6 +7,7 @@ mod light;
 mod probe;
 mod program;
 mod refusals;
+mod relight;
 #[cfg(unix)]
 mod stopping;
 mod verify;

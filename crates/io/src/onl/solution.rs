@@ -93,6 +93,9 @@ fn chunks(solution: &Solution) -> ChunkWriter {
     if solution.lit().iter().any(|l| *l != 1.0) {
         writer.add_array("lit", solution.lit());
     }
+    if !solution.errors().is_empty() {
+        writer.add_array("errors", solution.errors());
+    }
     writer.add_array("links", &links);
     writer.add_array("blocks", solution.links().blocks());
     if let Some(samples) = solution.kept() {
@@ -134,6 +137,13 @@ pub fn solution_of(file: &ChunkFile) -> Result<Solution, OnlError> {
     let mut solution = Solution::new(Arc::new(scene), settings, forest, links, coefficients, statistics);
     if let Some(samples) = samples {
         solution = solution.with_kept(samples);
+    }
+    if file.has("errors") {
+        let errors = file.finite_f64("errors")?;
+        if errors.len() != solution.scene().sides.len() || errors.iter().any(|e| *e < 0.0) {
+            return Err(file.content("errors", "not one error from 0 up for each side"));
+        }
+        solution = solution.with_errors(errors);
     }
     if !file.has("lit") {
         return Ok(solution);

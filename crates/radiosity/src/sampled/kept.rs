@@ -195,6 +195,7 @@ impl Sampled {
             rounds: 0,
             refitted: false,
             stalled: false,
+            missed: Vec::new(),
             error: f64::INFINITY,
             statistics: solution.statistics().clone(),
             scene,

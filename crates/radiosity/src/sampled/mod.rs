@@ -105,6 +105,8 @@ pub(crate) struct Sampled {
     /// Whether direct light changed since the last balance.
     refitted: bool,
     stalled: bool,
+    /// Estimated integral of the error over each side, channels summed.
+    missed: Vec<f64>,
     error: f64,
     statistics: Statistics,
 }
@@ -161,6 +163,7 @@ impl Sampled {
             rounds: 0,
             refitted: false,
             stalled: false,
+            missed: Vec::new(),
             error: f64::INFINITY,
             statistics: Statistics::default(),
         })
@@ -196,12 +199,14 @@ impl Sampled {
         let (forest, irradiance) = (self.forest.clone(), self.irradiance.clone());
         Solution::new(self.scene.clone(), self.settings, forest, Links::new(), irradiance, self.counts_now())
             .with_lit(self.lit.clone())
+            .with_errors(self.missed.clone())
     }
 
     pub(crate) fn into_solution(self) -> Solution {
         let statistics = self.counts_now();
         Solution::new(self.scene, self.settings, self.forest, Links::new(), self.irradiance, statistics)
             .with_lit(self.lit)
+            .with_errors(self.missed)
     }
 
     /// Whether the promise counts a side: pure emitters receive too, but nobody asked how much.

@@ -46,7 +46,10 @@ impl Sampled {
     /// Estimates the error, and plans what comes next.
     pub(super) fn judge(&mut self, unsolved: f64) -> Event {
         self.whole = self.integral(&self.irradiance);
-        self.error = if self.whole > 0.0 { SAFETY * self.missed() / self.whole + unsolved } else { 0.0 };
+        self.missed = self.missed_by_side();
+        let missed: f64 = self.missed.iter().sum();
+        self.error = if self.whole > 0.0 { SAFETY * missed / self.whole + unsolved } else { 0.0 };
+        self.missed.iter_mut().for_each(|m| *m *= SAFETY);
         self.rounds += 1;
         self.refitted = false;
         let event = Event::Solved { error: self.error, links: 0, elements: self.forest.leaves() };
@@ -65,9 +68,9 @@ impl Sampled {
         event
     }
 
-    /// All three errors together, as an integral over counted sides, channels summed: on every leaf they are independent
-    /// of one another, so their squares add up there.
-    fn missed(&self) -> f64 {
+    /// All three errors together, as an integral over each counted side, channels summed: on every leaf they are
+    /// independent of one another, so their squares add up there.
+    fn missed_by_side(&self) -> Vec<f64> {
         let root = |k: usize| self.verdicts[k].misfit.max(0.0).sqrt();
         let counted = |k: &usize| self.counts(self.forest.node(self.gathers[*k].node).cell.root);
         let roots: f64 = (0..self.gathers.len())
@@ -80,7 +83,7 @@ impl Sampled {
             let scatter = MEAN_OF_SCATTER * self.verdicts[k].scatter;
             local[self.gathers[k].node.index()] = scatter.hypot(scale * root(k));
         }
-        let mut together = 0.0;
+        let mut together = vec![0.0; self.scene.sides.len()];
         for (n, node) in self.forest.nodes().iter().enumerate() {
             if !self.counts(node.cell.root) {
                 continue;
@@ -92,7 +95,7 @@ impl Sampled {
             } else {
                 let (direct, scatter) = self.direct_error(n);
                 let area = node.measure * f64::from(self.lit[n]);
-                together += area * direct.hypot(local[n].hypot(scatter));
+                together[node.cell.root as usize] += area * direct.hypot(local[n].hypot(scatter));
             }
         }
         together

@@ -1,0 +1,73 @@
+//! `ondelette relight`, and what `ondelette light` keeps for it; added lamps; memory.
+
+use crate::program::{Place, room};
+use serde_json::Value;
+
+fn report(place: &Place, name: &str) -> Value {
+    serde_json::from_slice(&place.read(name)).unwrap()
+}
+
+#[test]
+fn another_lamp_and_another_wall_without_a_ray() {
+    let place = Place::new();
+    room(&place);
+    place.run("light room.obj --error 2% --keep-links -o room.onl --report first.json").with_code(0);
+    place.run("relight room.onl --emission lamp=6,4,2 -o twice.onl --report twice.json").with_code(0);
+    let [first, twice] = ["first.json", "twice.json"].map(|name| report(&place, name));
+    assert_eq!(first["rays"], twice["rays"]);
+    let absorbed = |r: &Value| r["ledger"]["absorbed"][1].as_f64().unwrap();
+    assert!((absorbed(&twice) / absorbed(&first) - 2.0).abs() < 0.02);
+    // finer, with the rays that are missing
+    let finer = "relight room.onl --reflectance grey=0.3,0.4,0.5 --refine --error 1% -o finer.onl -o finer.png --report finer.json";
+    place.run(finer).with_code(0);
+    let finer = report(&place, "finer.json");
+    assert!(finer["estimated_error"].as_f64().unwrap() <= 0.01);
+    assert_eq!(finer["settings"]["error"], 0.01);
+    let surfaces = finer["surfaces"].as_array().unwrap();
+    assert!(
+        !surfaces.is_empty()
+            && surfaces
+                .iter()
+                .all(|s| s["name"].is_string() && s["estimated_error"].is_number() || s["estimated_error"].is_null())
+    );
+}
+
+#[test]
+fn what_cannot_be_lit_anew_is_refused() {
+    let place = Place::new();
+    room(&place);
+    place.run("light room.obj --error 5% -o bare.onl").with_code(0);
+    place.run("light room.obj --error 5% --keep-links -o room.onl").with_code(0);
+    let before = place.names();
+    for (arguments, said) in [
+        ("relight bare.onl --emission lamp=1 -o x.onl", "--keep-links"),
+        ("relight room.onl --emission lamb=1 -o x.onl", "'lamp'"),
+        ("relight room.onl --reflectance grey=1 -o x.onl", "[0, 1)"),
+        ("relight room.onl --emission lamp=-1 -o x.onl", "'lamp' cannot emit -1"),
+        ("relight room.onl --emission lamp=NaN -o x.onl", "MATERIAL=r,g,b"),
+        ("relight room.onl -o x.onl", "nothing to change"),
+        ("relight room.onl --emission lamp=1 -o room.onl", "would be overwritten"),
+        ("relight room.obj --emission lamp=1 -o x.onl", "not an Ondelette solution"),
+        ("relight room.onl --emission lamp=1 --keep-links -o x.png", "add -o NAME.onl"),
+        ("light room.obj --keep-links -o x.png", "add -o NAME.onl"),
+        ("light room.obj --memory 1 -o x.png", "512MB"),
+        ("light room.obj --method wavelet --memory 1GB -o x.png", "--method sampled"),
+        ("light room.obj --light at=0,0 -o x.png", "three numbers"),
+    ] {
+        let ended = place.run(arguments).with_code(2);
+        assert!(ended.err.contains(said), "{arguments}: no '{said}' in {}", ended.err);
+        assert_eq!(place.names(), before, "{arguments}");
+    }
+}
+
+#[test]
+fn a_dark_scene_gets_a_lamp() {
+    let place = Place::new();
+    room(&place);
+    place.write("dark.obj", crate::program::ROOM.replace("usemtl lamp", "usemtl grey"));
+    place.run("light dark.obj -o x.onl").with_code(2);
+    let lamp = "--light at=1,1,1.5:size=0.4:radiance=10:facing=0,0,-1";
+    place.run(&format!("light dark.obj --error 5% {lamp} -o x.onl --report x.json")).with_code(0);
+    let emitted = report(&place, "x.json")["ledger"]["emitted"][0].as_f64().unwrap();
+    assert!((emitted - 1.6 * std::f64::consts::PI).abs() < 1e-9, "{emitted}");
+}
