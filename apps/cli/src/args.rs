@@ -26,6 +26,15 @@ pub(crate) struct Args {
     pub(crate) command: Command,
 }
 
+/// How direct light is read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum DirectLight {
+    /// As solved.
+    Fitted,
+    /// Exactly, at the point.
+    Gather,
+}
+
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// Light a scene
@@ -85,6 +94,10 @@ pub(crate) struct LightArgs {
     /// Stop solving after this time: 10s, 2m, 500ms. The state reached is written, and the exit code is 1
     #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     pub(crate) max_time: Option<String>,
+
+    /// Direct light in pictures: fitted (as solved), or gathered anew at every pixel that is in a penumbra
+    #[arg(long, value_name = "HOW", default_value = "fitted")]
+    pub(crate) direct: DirectLight,
 
     /// Keep in the .onl file what `ondelette relight` goes on from: the samples of the transport operator
     #[arg(long)]
@@ -193,6 +206,11 @@ pub(crate) struct ProbeArgs {
     /// Table to write, a row a point in order [default: standard output]
     #[arg(short = 'o', long = "output", value_name = "OUT.csv")]
     pub(crate) output: Option<PathBuf>,
+
+    /// Direct light: fitted (as solved), or gathered anew at every point that is in a penumbra, with exact visibility
+    /// (needs a solution of `light --keep-links`)
+    #[arg(long, value_name = "HOW", default_value = "fitted")]
+    pub(crate) direct: DirectLight,
 
     /// Irradiance at free points and normals, gathered from the solved scene; the radiosity columns stay empty
     #[arg(long)]

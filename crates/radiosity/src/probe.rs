@@ -2,6 +2,7 @@
 
 use crate::kernel::LightKernel;
 use crate::rgb::Rgb;
+use crate::sampled::ExactDirect;
 use crate::solution::Solution;
 use glam::DVec3;
 use ondelette_compress::NodeId;
@@ -13,6 +14,7 @@ pub struct Prober<'a> {
     kernel: LightKernel,
     /// Radiosity means of all nodes, for gathering.
     means: Vec<Rgb>,
+    exact: Option<ExactDirect>,
 }
 
 /// A point belongs to a surface within this share of the scene's diagonal.
@@ -41,7 +43,14 @@ impl<'a> Prober<'a> {
                 }
             }
         }
-        Prober { solution, kernel: LightKernel::new(solution.scene()), means }
+        Prober { solution, kernel: LightKernel::new(solution.scene()), means, exact: None }
+    }
+
+    /// Gathers direct light anew at every point whose leaf is penumbra, with exact visibility: shadows stay crisp at
+    /// any density of points. `None` if the solution did not keep its samples.
+    pub fn with_exact_direct_light(mut self) -> Option<Self> {
+        self.exact = Some(ExactDirect::new(self.solution, &self.kernel)?);
+        Some(self)
     }
 
     /// The side under a point whose normal faces the same way, and the side-local coordinates there.
@@ -84,7 +93,17 @@ impl<'a> Prober<'a> {
         if lit < 1.0 && (lit == 0.0 || self.kernel.is_buried(side, self.solution.point(side, at))) {
             return Rgb::BLACK;
         }
-        self.solution.irradiance(side, at)
+        let exact = self.exact.as_ref();
+        match exact.and_then(|e| e.correction(self.solution, &self.kernel, side, at)) {
+            Some(correction) => (self.solution.irradiance_in_leaf(side, at) + correction).map(|e| e.max(0.0)),
+            None => self.solution.irradiance(side, at),
+        }
+    }
+
+    /// Radiosity (exitance plus reflected) at side-local coordinates.
+    pub fn radiosity(&self, side: usize, at: [f64; 2]) -> Rgb {
+        let material = self.solution.scene().material(self.solution.scene().sides[side]);
+        material.radiance * std::f64::consts::PI + material.reflectance * self.irradiance(side, at)
     }
 
     /// Irradiance at a free point with a unit normal, gathered from the solved scene: elements in closed form, their

@@ -102,6 +102,13 @@ impl Solution {
         self
     }
 
+    /// The same without kept samples.
+    #[must_use]
+    pub fn without_kept(mut self) -> Self {
+        self.kept = None;
+        self
+    }
+
     /// The samples that were kept, if any.
     pub fn kept(&self) -> Option<&Arc<Kept>> {
         self.kept.as_ref()
@@ -171,6 +178,12 @@ impl Solution {
             }
         }
         if count > 0.0 { sum * (1.0 / count) } else { self.inside(leaf, x) }
+    }
+
+    /// Irradiance by the polynomial of the one leaf that holds a point, also on edges.
+    pub(crate) fn irradiance_in_leaf(&self, side: usize, at: [f64; 2]) -> Rgb {
+        let (leaf, x) = self.forest.locate(side, at);
+        self.inside(leaf, x)
     }
 
     /// The polynomial of one leaf.

@@ -3,6 +3,7 @@
 //! Camera rays alone look through the backs of one-sided patches, so that a closed room can be seen from outside.
 
 use crate::kernel::LightKernel;
+use crate::probe::Prober;
 use crate::rgb::Rgb;
 use crate::scene::{Camera, Scene};
 use crate::solution::Solution;
@@ -17,6 +18,7 @@ const ROWS: usize = 8;
 /// Renders band by band.
 pub struct Renderer<'a> {
     solution: &'a Solution,
+    prober: Option<Prober<'a>>,
     kernel: LightKernel,
     lens: Lens,
     size: [usize; 2],
@@ -53,8 +55,17 @@ impl<'a> Renderer<'a> {
     /// Prepares a picture of `width` x `height` pixels.
     pub fn new(solution: &'a Solution, camera: &Camera, width: usize, height: usize) -> Self {
         let kernel = LightKernel::new(solution.scene());
+        let prober = None;
         let lens = Lens::new(camera, width as f64 / height.max(1) as f64);
-        Renderer { solution, kernel, lens, size: [width, height], pixels: Vec::with_capacity(width * height) }
+        Renderer { solution, prober, kernel, lens, size: [width, height], pixels: Vec::with_capacity(width * height) }
+    }
+
+    /// Draws shadows by direct light gathered anew at every point that is in a penumbra; without effect on a solution
+    /// that did not keep its samples.
+    #[must_use]
+    pub fn with_exact_direct_light(mut self) -> Self {
+        self.prober = Prober::new(self.solution).with_exact_direct_light();
+        self
     }
 
     /// Renders the next band of rows; true when the picture is complete.
@@ -99,7 +110,11 @@ impl<'a> Renderer<'a> {
             None => Rgb::BLACK,
             Some(side) => {
                 let at = if hit.front { hit.at } else { [hit.at[1], hit.at[0]] };
-                self.solution.radiosity(side, at).map(|b| (b / std::f64::consts::PI).max(0.0))
+                let radiosity = match &self.prober {
+                    Some(prober) => prober.radiosity(side, at),
+                    None => self.solution.radiosity(side, at),
+                };
+                radiosity.map(|b| (b / std::f64::consts::PI).max(0.0))
             }
         }
     }

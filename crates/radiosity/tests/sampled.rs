@@ -297,3 +297,25 @@ fn strong_reflections_of_a_spot_carry_their_scatter() {
     let ledger = Ledger::count(&solution, 1 << 18);
     assert!(ledger.closure().abs() < 0.012, "{}", ledger.closure());
 }
+
+#[test]
+fn direct_light_gathered_anew_makes_shadows_crisp() {
+    let scene = || samples::quads("box", &room_with_box(0.0));
+    let mut solver = Solver::new(scene(), Settings { error: 0.1, ..Settings::default() }).unwrap();
+    while solver.step().is_some() {}
+    let coarse = solver.into_kept();
+    let fine = solve(scene(), "m2", 0.01);
+    assert!(Prober::new(&fine).with_exact_direct_light().is_none(), "nothing was kept");
+    let [fitted, exact] = [Prober::new(&coarse), Prober::new(&coarse).with_exact_direct_light().unwrap()];
+    let truth = Prober::new(&fine);
+    // root mean square on a line across the shadow of the box on the floor
+    let miss = |prober: &Prober| {
+        let square = |k: u32| {
+            let at = [0.02 + 0.96 * f64::from(k) / 200.0, 0.71];
+            (prober.irradiance(0, at).0[0] - truth.irradiance(0, at).0[0]).powi(2)
+        };
+        ((0..200).map(square).sum::<f64>() / 200.0).sqrt()
+    };
+    let [blurred, crisp] = [miss(&fitted), miss(&exact)];
+    assert!(crisp < 0.7 * blurred, "{crisp} against {blurred}");
+}

@@ -2,7 +2,7 @@
 
 use super::check_distinct;
 use super::values::{self, CameraRequest};
-use crate::args::{LightArgs, RelightArgs};
+use crate::args::{DirectLight, LightArgs, RelightArgs};
 use crate::run::Refusal;
 use ondelette_io::Panel;
 use ondelette_io::write::{check_writable, elements_path};
@@ -99,6 +99,8 @@ pub(crate) struct LightPlan {
     pub(crate) settings: Settings,
     /// Whether the samples go into the solution file.
     pub(crate) keep: bool,
+    /// Whether pictures gather direct light anew.
+    pub(crate) exact: bool,
     /// Bytes that elements and samples may take.
     pub(crate) memory: Option<u64>,
     pub(crate) max_time: Option<Duration>,
@@ -132,6 +134,7 @@ impl LightPlan {
             panels: args.lights.iter().map(|text| values::panel(text)).collect::<Result<_, _>>()?,
             settings,
             keep: args.keep_links,
+            exact: args.direct == DirectLight::Gather,
             memory: args.memory.as_deref().map(values::memory).transpose()?,
             max_time: args.max_time.as_deref().map(values::duration).transpose()?,
             threads: args.threads.as_deref().map(values::threads).transpose()?,
@@ -212,6 +215,7 @@ impl RelightPlan {
             panels: Vec::new(),
             settings: Settings::default(),
             keep: args.keep_links,
+            exact: false,
             memory: None,
             max_time: args.max_time.as_deref().map(values::duration).transpose()?,
             threads: args.threads.as_deref().map(values::threads).transpose()?,

@@ -16,7 +16,7 @@ use ondelette_numerics::par;
 use ondelette_radiosity::ledger::Ledger;
 use ondelette_radiosity::scene::{Camera, Shape};
 use ondelette_radiosity::view::{Renderer, frame_from_inside};
-use ondelette_radiosity::{Scene, Solution, Solver};
+use ondelette_radiosity::{Scene, Solver};
 use ondelette_wavelet::cell::CellFamily;
 
 /// Pixels of a picture.
@@ -87,8 +87,8 @@ pub(super) fn finish(
     stop: Stop,
     mut progress: Progress,
 ) -> Result<Outcome, Refusal> {
-    let solution = if plan.keep { solver.into_kept() } else { solver.into_solution() };
-    if plan.keep && solution.kept().is_none() {
+    let solution = if plan.keep || plan.exact { solver.into_kept() } else { solver.into_solution() };
+    if (plan.keep || plan.exact) && solution.kept().is_none() {
         tell("note: stopped in the middle of a refinement: the samples are not kept");
     }
 
@@ -119,7 +119,8 @@ fn write_outputs(
     for output in quick {
         progress.stage(&format!("writing {}", output.path.display()), 0.0);
         match output.kind {
-            Kind::Solution => write_solution(&output.path, solution)?,
+            Kind::Solution if record.plan.keep => write_solution(&output.path, solution)?,
+            Kind::Solution => write_solution(&output.path, &solution.clone().without_kept())?,
             Kind::Tables => {
                 write_tables(&output.path, solution)?;
                 record.written.push(elements_path(&output.path));
@@ -137,7 +138,7 @@ fn write_outputs(
         record.stages.end("ledger");
     }
     let Some(camera) = camera else { return Ok(()) };
-    let Some(pixels) = draw(solution, &camera, record.stopped, stop, progress) else {
+    let Some(pixels) = draw(record, &camera, stop, progress) else {
         record.stopped = Some(Reason::Signal);
         tell("stopped by Ctrl-C while drawing: the picture is left out");
         return Ok(());
@@ -161,16 +162,13 @@ fn write_outputs(
 }
 
 /// The picture, or nothing if a Ctrl-C came that had not come before.
-fn draw(
-    solution: &Solution,
-    camera: &Camera,
-    stopped: Option<Reason>,
-    stop: Stop,
-    progress: &mut Progress,
-) -> Option<Vec<[f32; 3]>> {
-    let mut renderer = Renderer::new(solution, camera, PICTURE[0], PICTURE[1]);
+fn draw(record: &Record<'_>, camera: &Camera, stop: Stop, progress: &mut Progress) -> Option<Vec<[f32; 3]>> {
+    let mut renderer = Renderer::new(record.solution, camera, PICTURE[0], PICTURE[1]);
+    if record.plan.exact {
+        renderer = renderer.with_exact_direct_light();
+    }
     loop {
-        if stop.signalled() && stopped != Some(Reason::Signal) {
+        if stop.signalled() && record.stopped != Some(Reason::Signal) {
             return None;
         }
         if renderer.step() {

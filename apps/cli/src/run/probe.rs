@@ -1,7 +1,7 @@
 //! `ondelette probe`: points in, values out.
 
 use super::{Outcome, Refusal, print, tell};
-use crate::args::ProbeArgs;
+use crate::args::{DirectLight, ProbeArgs};
 use crate::plan::check_distinct;
 use glam::DVec3;
 use ondelette_io::onl::read_solution;
@@ -52,7 +52,7 @@ pub(crate) fn run(args: &ProbeArgs) -> Result<Outcome, Refusal> {
         let percent = 100.0 * solution.statistics().estimated_error;
         tell(format_args!("note: {} is unfinished; its estimated error is {percent:.3} %", args.solution.display()));
     }
-    let answers = answer(&solution, &points, args.gather);
+    let answers = answer(&solution, &points, args)?;
     refuse_points_off_surfaces(&args.points, &solution, &points, &answers)?;
 
     let header = format!("{},{VALUES}\n", COLUMNS.join(","));
@@ -76,13 +76,21 @@ pub(crate) fn run(args: &ProbeArgs) -> Result<Outcome, Refusal> {
     Ok(Outcome::Done)
 }
 
-fn answer(solution: &Solution, points: &[Point], gather: bool) -> Vec<Option<Answer>> {
-    let prober = Prober::new(solution);
+fn answer(solution: &Solution, points: &[Point], args: &ProbeArgs) -> Result<Vec<Option<Answer>>, Refusal> {
+    let mut prober = Prober::new(solution);
+    if args.direct == DirectLight::Gather {
+        prober = prober.with_exact_direct_light().ok_or_else(|| {
+            Refusal::new(format!(
+                "{}: it did not keep what --direct gather needs: solve it again with --keep-links",
+                args.solution.display()
+            ))
+        })?;
+    }
     let chunks = par::map(points.len().div_ceil(CHUNK), |chunk| {
         let own = &points[chunk * CHUNK..points.len().min((chunk + 1) * CHUNK)];
         let one = |p: &Point| -> Option<Answer> {
             let (position, normal) = (p.position(), p.normal().normalize());
-            if gather {
+            if args.gather {
                 return Some((prober.gather(position, normal).0, None));
             }
             let (side, at) = prober.find(position, normal)?;
@@ -93,7 +101,7 @@ fn answer(solution: &Solution, points: &[Point], gather: bool) -> Vec<Option<Ans
         };
         own.iter().map(one).collect::<Vec<_>>()
     });
-    chunks.into_iter().flatten().collect()
+    Ok(chunks.into_iter().flatten().collect())
 }
 
 fn refuse_points_off_surfaces(

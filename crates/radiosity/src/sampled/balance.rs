@@ -9,7 +9,7 @@
 //! for the scatter, with signs drawn at random for the elements, a few times over.
 
 use super::gather::{self, Field, Verdict};
-use super::{Phase, RAYS_A_STEP, Sampled, stitch};
+use super::{Phase, RAYS_A_STEP, Sampled, positive, stitch};
 use crate::solver::Event;
 use ondelette_numerics::krylov::Gmres;
 use ondelette_numerics::{par, seed};
@@ -217,6 +217,7 @@ impl Sampled {
         }
         let mut irradiance = self.direct_light();
         self.add_indirect(&smooth, &mut irradiance);
+        positive::keep_positive(&self.forest, &mut irradiance);
         self.irradiance = irradiance;
     }
 

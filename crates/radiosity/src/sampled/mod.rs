@@ -11,14 +11,17 @@
 
 mod balance;
 mod direct;
+mod exact;
 mod gather;
 mod kept;
 mod lamps;
 mod memory;
 mod plan;
+mod positive;
 mod sphere;
 mod stitch;
 
+pub(crate) use exact::ExactDirect;
 pub use kept::Kept;
 
 use crate::kernel::LightKernel;
