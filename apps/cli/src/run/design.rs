@@ -1,5 +1,6 @@
 //! `ondelette curve` and `ondelette surface`: the smoothest shape under constraints.
 
+use super::intrinsic;
 use super::shape_input::read_text;
 use super::shape_output::Outgoing;
 use super::{Outcome, Refusal, tell};
@@ -13,7 +14,7 @@ use ondelette_modeling::Axis;
 use ondelette_modeling::constraint::{Constraint, Demand};
 use ondelette_modeling::energy::{Energy, Stiffness};
 use ondelette_modeling::shape::{Curve, ParametricCurve, ParametricSurface, Surface};
-use ondelette_modeling::solve::{Method, Settings, Solution, Solver};
+use ondelette_modeling::solve::{Method, Residual, Settings, Solution, Solver};
 use ondelette_modeling::system::{Problem, Space};
 use serde_json::{Value, json};
 use std::fmt::Display;
@@ -25,6 +26,9 @@ pub(crate) fn run(plan: &DesignPlan) -> Result<Outcome, Refusal> {
     let mut document = Document::read(&read_text(&plan.spec)?, Some(plan.axes)).map_err(|e| named(&e))?;
     if let Some(solver) = &plan.solver {
         document.solver.clone_from(solver);
+    }
+    if let Some(minimum) = document.intrinsic {
+        return intrinsic::run(plan, document, minimum, &stop, stages);
     }
     let problem = problem(&document).map_err(|e| named(&e))?;
     let method: Method = document.solver.parse().map_err(|e| named(&e))?;
@@ -48,7 +52,12 @@ pub(crate) fn run(plan: &DesignPlan) -> Result<Outcome, Refusal> {
         return Err(named(&solution.notes().join("; ")));
     }
     document.geometry = geometry(&document.axes, &solution).map_err(|e| named(&e))?;
-    let out = Outgoing { document: &document, around: None, marks: marks(&document, &problem), control: None };
+    let out = Outgoing {
+        document: &document,
+        around: None,
+        marks: marks(&document, problem.constraints(), problem.coordinates()),
+        control: None,
+    };
     out.write(&plan.out)?;
     stages.end("write");
     if let Some(path) = &plan.report {
@@ -76,6 +85,16 @@ fn problem(document: &Document) -> Result<Problem, String> {
     if document.adaptive {
         return Err("adaptive: no solver of this version works on an adaptive set; leave it out".to_owned());
     }
+    let (constraints, coordinates) = constraints(document)?;
+    let [stretch, bend, variation] = document.energy;
+    let energy = Energy::new(stretch, bend, variation).map_err(|e| e.to_string())?;
+    let space = space(&document.axes);
+    let stiffness = stiffness(document, &space)?;
+    Problem::new(space, coordinates, energy, stiffness, constraints).map_err(|e| e.to_string())
+}
+
+/// The constraints of a document, and the coordinates that they speak of.
+pub(super) fn constraints(document: &Document) -> Result<(Vec<Constraint>, usize), String> {
     if document.constraints.is_empty() {
         return Err("there are no constraints: nothing holds the shape anywhere".to_owned());
     }
@@ -83,12 +102,7 @@ fn problem(document: &Document) -> Result<Problem, String> {
     for spec in &document.constraints {
         constraints.extend(demands(spec)?);
     }
-    let coordinates = coordinates(&document.constraints)?;
-    let [stretch, bend, variation] = document.energy;
-    let energy = Energy::new(stretch, bend, variation).map_err(|e| e.to_string())?;
-    let space = space(&document.axes);
-    let stiffness = stiffness(document, &space)?;
-    Problem::new(space, coordinates, energy, stiffness, constraints).map_err(|e| e.to_string())
+    Ok((constraints, coordinates(&document.constraints)?))
 }
 
 fn space(axes: &[Axis]) -> Space {
@@ -187,7 +201,7 @@ fn geometry(axes: &[Axis], solution: &Solution) -> Result<Geometry, String> {
 }
 
 /// What pictures show of the constraints.
-fn marks(document: &Document, problem: &Problem) -> Vec<Mark> {
+pub(super) fn marks(document: &Document, constraints: &[Constraint], coordinates: usize) -> Vec<Mark> {
     let jet = |at: &[f64]| match &document.geometry {
         Geometry::Curve(c) => {
             let j = c.jet(at[0]);
@@ -199,7 +213,7 @@ fn marks(document: &Document, problem: &Problem) -> Vec<Mark> {
         }
         Geometry::None => None,
     };
-    let heights = problem.coordinates() == 1;
+    let heights = coordinates == 1;
     let place = |values: &[Option<f64>], here: [f64; 3]| -> [f64; 3] {
         let shift = if heights { document.axes.len() } else { 0 };
         std::array::from_fn(|c| match c.checked_sub(shift).and_then(|k| values.get(k)) {
@@ -208,7 +222,7 @@ fn marks(document: &Document, problem: &Problem) -> Vec<Mark> {
         })
     };
     let mut out = Vec::new();
-    for c in problem.constraints() {
+    for c in constraints {
         let Some((here, first)) = jet(&c.at) else { continue };
         match &c.demand {
             Demand::Position(values) if c.weight.is_some() => out.push(Mark::Soft(place(values, here), here)),
@@ -232,15 +246,10 @@ fn report(document: &Document, problem: &Problem, solution: &Solution, stages: &
     let energy_knots: f64 =
         solution.coefficients().iter().map(|x| problem.energy().of(&unit, problem.stiffness(), x)).sum();
     let (method, why) = solution.method();
-    let mut residuals = serde_json::Map::new();
-    for r in solution.residuals() {
-        let worst = residuals.get(&r.id).and_then(Value::as_f64).unwrap_or(0.0);
-        residuals.insert(r.id.clone(), json!(worst.max(r.miss.abs())));
-    }
     json!({
         "energy": solution.energy(),
         "energy_knots": energy_knots,
-        "residuals": residuals,
+        "residuals": worst_by_id(solution.residuals()),
         "iterations": solution.iterations(),
         "control_points": solution.space().len(),
         "active": solution.space().len(),
@@ -252,4 +261,14 @@ fn report(document: &Document, problem: &Problem, solution: &Solution, stages: &
         "notes": solution.notes(),
         "seconds": stages.json(),
     })
+}
+
+/// The largest miss of each constraint.
+pub(super) fn worst_by_id(residuals: &[Residual]) -> serde_json::Map<String, Value> {
+    let mut out = serde_json::Map::new();
+    for r in residuals {
+        let worst = out.get(&r.id).and_then(Value::as_f64).unwrap_or(0.0);
+        out.insert(r.id.clone(), json!(worst.max(r.miss.abs())));
+    }
+    out
 }

@@ -44,6 +44,33 @@ fn the_natural_spline_comes_out_of_a_specification() {
 }
 
 #[test]
+fn an_intrinsic_energy_finds_the_circle_and_says_when_there_is_no_minimum() {
+    let place = Place::new();
+    let points = r#""constraints": [ { "id": "e", "at": 0, "position": [1, 0] }, { "at": 0.25, "position": [0, 1] },
+        { "at": 0.5, "position": [-1, 0] }, { "at": 0.75, "position": [0, -1] } ] }"#;
+    place.write(
+        "ring.json",
+        format!(r#"{{ "boundary": "periodic", "spans": 128, "energy": {{ "intrinsic": "mvc" }}, {points}"#),
+    );
+    place.run("curve ring.json -o out.json -o out.svg -o out.png --comb --report r.json").with_code(0);
+    let report = document(&place, "r.json");
+    assert!((report["length"].as_f64().unwrap() - std::f64::consts::TAU).abs() < 1e-6, "{report}");
+    assert!(report["functional"].as_f64().unwrap() < 1e-9 && report["iterations"].as_u64().unwrap() < 40, "{report}");
+    assert_eq!(document(&place, "out.json")["energy"], json!({ "intrinsic": "mvc" }));
+    // The document goes in again, and edits.
+    place.run("curve out.json -o again.json").with_code(0);
+    place.run("edit out.json --level 2 --move 2 0,1 -o edited.json").with_code(0);
+    // A loop held at three points of nearly a line opens without end.
+    place.write(
+        "loose.json",
+        r#"{ "boundary": "periodic", "spans": 32, "energy": { "intrinsic": "mec" }, "constraints": [
+            { "at": 0, "position": [1, 0] }, { "at": 0.25, "position": [0, 0.2] }, { "at": 0.5, "position": [-1, 0] } ] }"#,
+    );
+    let ended = place.run("curve loose.json -o loose-out.json").with_code(1);
+    assert!(ended.err.contains("without bound") && ended.err.contains("not converged"), "{}", ended.err);
+}
+
+#[test]
 fn a_tilted_plane_is_found_and_written_in_every_format() {
     let place = Place::new();
     place.write(
@@ -88,6 +115,22 @@ fn specifications_that_make_no_sense_are_refused_by_name() {
         ("curve", constraints(a).replace("{ \"levels\"", "{ \"solver\": \"magic\", \"levels\""), "magic"),
         ("curve", constraints(a).replace("{ \"levels\"", "{ \"solver\": \"spectral\", \"levels\""), "spectral"),
         ("curve", constraints(a).replace("{ \"levels\"", "{ \"adaptive\": true, \"levels\""), "adaptive"),
+        ("curve", constraints(a).replace("{ \"levels\"", "{ \"energy\": { \"intrinsic\": 3 }, \"levels\""), "mec"),
+        (
+            "curve",
+            constraints(a).replace("{ \"levels\"", "{ \"energy\": { \"intrinsic\": \"mic\" }, \"levels\""),
+            "mic",
+        ),
+        (
+            "curve",
+            constraints(a).replace("{ \"levels\"", "{ \"energy\": { \"intrinsic\": \"mec\" }, \"levels\""),
+            "coincide",
+        ),
+        (
+            "surface",
+            constraints(a).replace("{ \"levels\"", "{ \"energy\": { \"intrinsic\": \"mec\" }, \"levels\""),
+            "curves",
+        ),
         ("surface", constraints(a), "a"),
         ("surface", r#"{ "kind": "curve", "levels": 3 }"#.to_owned(), "surface"),
     ] {
