@@ -1,5 +1,6 @@
 //! `ondelette curve` and `ondelette surface`: the smoothest shape under constraints.
 
+use super::constraints::constraints;
 use super::intrinsic;
 use super::shape_input::read_text;
 use super::shape_output::Outgoing;
@@ -8,7 +9,7 @@ use crate::interrupt::Stop;
 use crate::plan::shape::DesignPlan;
 use crate::report::Stages;
 use ondelette_io::shape::picture::Mark;
-use ondelette_io::shape::{ConstraintSpec, Document, Geometry};
+use ondelette_io::shape::{Document, Geometry};
 use ondelette_io::write::write_bytes;
 use ondelette_modeling::Axis;
 use ondelette_modeling::constraint::{Constraint, Demand};
@@ -93,80 +94,11 @@ fn problem(document: &Document) -> Result<Problem, String> {
     Problem::new(space, coordinates, energy, stiffness, constraints).map_err(|e| e.to_string())
 }
 
-/// The constraints of a document, and the coordinates that they speak of.
-pub(super) fn constraints(document: &Document) -> Result<(Vec<Constraint>, usize), String> {
-    if document.constraints.is_empty() {
-        return Err("there are no constraints: nothing holds the shape anywhere".to_owned());
-    }
-    let mut constraints = Vec::new();
-    for spec in &document.constraints {
-        constraints.extend(demands(spec)?);
-    }
-    Ok((constraints, coordinates(&document.constraints)?))
-}
-
-fn space(axes: &[Axis]) -> Space {
+pub(super) fn space(axes: &[Axis]) -> Space {
     match *axes {
         [s, t] => Space::surface(s, t),
         _ => Space::curve(axes[0]),
     }
-}
-
-/// Number of coordinates that the constraints speak of.
-fn coordinates(constraints: &[ConstraintSpec]) -> Result<usize, String> {
-    let mut found: Option<(usize, &str)> = None;
-    for spec in constraints {
-        let id = spec.id.as_deref().unwrap_or_default();
-        let lengths = [&spec.position, &spec.tangent, &spec.ds, &spec.dt].into_iter().flatten().map(Vec::len);
-        for n in lengths.chain(spec.normal.as_ref().map(Vec::len)) {
-            match found {
-                Some((m, first)) if m != n => {
-                    return Err(format!("constraint {id} has {n} coordinates, constraint {first} {m}"));
-                }
-                _ => found = Some((n, id)),
-            }
-        }
-    }
-    found.map(|f| f.0).ok_or_else(|| "no constraint says where the shape is: give positions".to_owned())
-}
-
-/// The demands of one constraint; the first bears its id, others say what they are.
-fn demands(spec: &ConstraintSpec) -> Result<Vec<Constraint>, String> {
-    let id = spec.id.clone().unwrap_or_default();
-    let mut found: Vec<(&str, Demand)> = Vec::new();
-    if let Some(p) = &spec.position {
-        found.push(("position", Demand::Position(p.clone())));
-    }
-    let derivatives = [("tangent", &spec.tangent, 0), ("ds", &spec.ds, 0), ("dt", &spec.dt, 1)];
-    for (name, value, axis) in derivatives {
-        if let Some(d) = value {
-            let fits = if name == "tangent" { spec.at.len() == 1 } else { spec.at.len() == 2 };
-            if !fits {
-                return Err(format!(
-                    "constraint {id}: {name} is for {}",
-                    if name == "tangent" { "curves" } else { "surfaces" }
-                ));
-            }
-            found.push((name, Demand::Derivative(axis, d.clone())));
-        }
-    }
-    if let Some(n) = &spec.normal {
-        found.push(("normal", Demand::Normal(n.clone())));
-    }
-    if let Some(k) = spec.curvature {
-        found.push(("curvature", Demand::Curvature(k)));
-    }
-    if found.is_empty() {
-        return Err(format!("constraint {id} asks for nothing: position, tangent, ds, dt, normal or curvature"));
-    }
-    let single = found.len() == 1;
-    let name = |i: usize, what: &str| if single || i == 0 { id.clone() } else { format!("{id}.{what}") };
-    let make = |(i, (what, demand)): (usize, (&str, Demand))| {
-        let mut c = Constraint::new(name(i, what), &spec.at, demand);
-        c.weight = spec.weight;
-        c
-    };
-    Ok(found.into_iter().enumerate().map(make).collect())
 }
 
 /// One factor a cell from the regions of the document.

@@ -1,6 +1,7 @@
 //! `ondelette curve` with an intrinsic energy: curves of least energy or variation whatever their parameter.
 
-use super::design::{constraints, marks, worst_by_id};
+use super::constraints::constraints;
+use super::design::{marks, worst_by_id};
 use super::shape_output::Outgoing;
 use super::{Outcome, Refusal, tell};
 use crate::interrupt::Stop;

@@ -1,5 +1,6 @@
 //! Doing it.
 
+mod constraints;
 pub(crate) mod design;
 pub(crate) mod edit;
 pub(crate) mod fit;

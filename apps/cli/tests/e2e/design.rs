@@ -71,6 +71,47 @@ fn an_intrinsic_energy_finds_the_circle_and_says_when_there_is_no_minimum() {
 }
 
 #[test]
+fn a_surface_is_led_along_curves_and_mirrored() {
+    let place = Place::new();
+    let arch = "[0, 0, 0], [1, 0, 0.5], [2, 0, 0]";
+    place.write(
+        "tent.json",
+        format!(
+            r#"{{ "levels": 4, "constraints": [
+            {{ "id": "front", "curve": {{ "at": [[0, 0], [1, 0]], "position": [{arch}] }} }},
+            {{ "id": "spine", "curve": {{ "at": [[0.2, 0], [0.5, 0.4], [0.6, 1]],
+                "position": [[0.4, 0, 0.284], [1, 1, 1], [1.2, 2, 0]] }} }},
+            {{ "id": "corner", "at": [0, 1], "position": [0, 2, 0] }},
+            {{ "id": "other", "at": [1, 1], "image": {{ "of": [0, 1], "factors": [-1, 1, 1], "offset": [2, 0, 0] }} }} ] }}"#
+        ),
+    );
+    let ended = place.run("surface tent.json -o out.json -o out.png --report r.json");
+    let report = if ended.code == Some(0) { document(&place, "r.json") } else { panic!("{}", ended.err) };
+    let residuals = report["residuals"].as_object().unwrap();
+    assert!(residuals.len() > 30 && residuals.contains_key("front[16]") && residuals.contains_key("spine[20]"));
+    assert!(residuals.values().all(|v| v.as_f64().unwrap() < 1e-9), "{report}");
+    let points = document(&place, "out.json")["points"].take();
+    let corner = |i: usize, j: usize, c: usize| points[i][j][c].as_f64().unwrap();
+    // s runs along rows, the other corner mirrors the first; the middle of the front edge is the top of its arch.
+    assert!((corner(18, 18, 0) - 2.0).abs() < 1e-9 && (corner(18, 18, 1) - 2.0).abs() < 1e-9);
+    assert_eq!(document(&place, "out.json")["constraints"][0]["curve"]["at"], json!([[0.0, 0.0], [1.0, 0.0]]));
+    // A sample that says the same again is named; one that says otherwise refused.
+    let twice = |z: f64| {
+        format!(
+            r#"{{ "levels": 3, "constraints": [
+            {{ "id": "a", "curve": {{ "at": [[0, 0], [1, 0]], "position": [[0], [1]] }} }},
+            {{ "id": "b", "curve": {{ "at": [[1, 0], [0, 0]], "position": [[{z}], [0]] }} }} ] }}"#
+        )
+    };
+    place.write("twice.json", twice(1.0));
+    let ended = place.run("surface twice.json -o twice-out.json").with_code(0);
+    assert!(ended.err.contains("b[0]") && ended.err.contains("redundant"), "{}", ended.err);
+    place.write("clash.json", twice(1.5));
+    let ended = place.run("surface clash.json -o clash-out.json").with_code(2);
+    assert!(ended.err.contains("b[0]") && ended.err.contains("contradicts"), "{}", ended.err);
+}
+
+#[test]
 fn a_tilted_plane_is_found_and_written_in_every_format() {
     let place = Place::new();
     place.write(
@@ -131,6 +172,14 @@ fn specifications_that_make_no_sense_are_refused_by_name() {
             constraints(a).replace("{ \"levels\"", "{ \"energy\": { \"intrinsic\": \"mec\" }, \"levels\""),
             "curves",
         ),
+        ("surface", constraints(r#"{ "id": "q", "curve": { "at": [[0, 0]], "position": [[1], [2]] } }"#), "q"),
+        (
+            "surface",
+            constraints(r#"{ "id": "q", "curve": { "at": [[0, 0], [1, 2]], "position": [[1], [2]] } }"#),
+            "outside",
+        ),
+        ("curve", constraints(r#"{ "id": "q", "curve": { "at": [[0, 0], [1, 1]], "position": [[1], [2]] } }"#), "q"),
+        ("curve", constraints(r#"{ "id": "q", "position": [1, 2] }"#), "at is missing"),
         ("surface", constraints(a), "a"),
         ("surface", r#"{ "kind": "curve", "levels": 3 }"#.to_owned(), "surface"),
     ] {

@@ -45,9 +45,15 @@ pub struct ConstraintSpec {
     /// Name; given by position (`c0`, `c1`, ...) if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub id: Option<String>,
-    /// Parameter, `t` or `[s, t]`.
-    #[serde(deserialize_with = "one_or_many")]
+    /// Parameter, `t` or `[s, t]`; of a curve on a surface none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty", deserialize_with = "one_or_many")]
     pub at: Vec<f64>,
+    /// A curve on a surface, sampled.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub curve: Option<RailSpec>,
+    /// The point here is that of another parameter, reflected or shifted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub image: Option<ImageSpec>,
     /// Point; null leaves a coordinate free.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "coordinates")]
     pub position: Option<Vec<Option<f64>>>,
@@ -69,6 +75,34 @@ pub struct ConstraintSpec {
     /// Soft with this weight; exact if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub weight: Option<f64>,
+}
+
+/// A curve on a surface: where it runs and what it passes through, each a smooth curve through its list.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RailSpec {
+    /// Parameters `[s, t]` that it runs through, two or more.
+    pub at: Vec<[f64; 2]>,
+    /// Points that the surface has along it, two or more.
+    pub position: Vec<Vec<f64>>,
+    /// How often it is sampled; left out: by the spans that it crosses.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub samples: Option<usize>,
+}
+
+/// The point at another parameter times factors plus an offset: symmetries and joins.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ImageSpec {
+    /// The other parameter.
+    #[serde(deserialize_with = "one_or_many")]
+    pub of: Vec<f64>,
+    /// A factor a coordinate.
+    #[serde(deserialize_with = "one_or_many")]
+    pub factors: Vec<f64>,
+    /// An offset a coordinate; zero if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub offset: Option<Vec<f64>>,
 }
 
 /// A part of the domain with another stiffness; later regions win.

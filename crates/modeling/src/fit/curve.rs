@@ -3,7 +3,7 @@
 //! Minimises the sum of squared misses at chord-length parameters plus `weight` times (bend + `stiffening`^2 stretch),
 //! by the banded solver. Weight and stiffening are chosen by cross-validation unless given, as of surfaces.
 
-use super::choose::search;
+use super::choose::{BEGIN, STEPS, search};
 use super::{FitError, FitSettings};
 use crate::axis::Axis;
 use crate::constraint::{Constraint, Demand};
@@ -106,7 +106,7 @@ pub fn curve(points: &[Vec<f64>], closed: bool, settings: FitSettings) -> Result
     if weight.is_none() || stiffening.is_none() {
         // The ends of an open curve are not left out: nothing would be between.
         let inner = |i: usize| closed || (i > 0 && i + 1 < m);
-        let fold = |i: usize| if inner(i) { seed::mix(i as u64 ^ 0x0c_a7) % FOLDS } else { FOLDS };
+        let fold = |i: usize| if inner(i) { seed::mix(i as u64 ^ 0x0ca7) % FOLDS } else { FOLDS };
         let mut validate = |weight: f64, stiffening: f64| {
             let (mut sum, mut count) = (0.0, 0);
             for k in 0..FOLDS {
@@ -120,7 +120,7 @@ pub fn curve(points: &[Vec<f64>], closed: bool, settings: FitSettings) -> Result
             }
             Ok(f64::sqrt(sum / f64::max(1.0, count as f64)))
         };
-        let (w, s, v) = search(m as f64, weight, stiffening, &mut validate)?;
+        let (w, s, v) = search(m as f64, [weight, stiffening], BEGIN, &STEPS, &mut validate)?;
         (weight, stiffening, validation) = (Some(w), Some(s), Some(v));
     }
     let (weight, stiffening) = (weight.unwrap_or(1e-9 * m as f64), stiffening.unwrap_or(0.0));

@@ -4,7 +4,7 @@
 //! multigrid conjugate gradients. Weight and stiffening are chosen by cross-validation unless given: points are left
 //! out in turns, and the pair that predicts them best is taken.
 
-use super::choose::search;
+use super::choose::{BEGIN, STEPS, search};
 use super::normal::Normal;
 use crate::axis::{Axis, AxisError};
 use crate::basis;
@@ -167,16 +167,16 @@ pub fn surface(data: &Scatter, settings: FitSettings) -> Result<Fit, FitError> {
     let mut validation = None;
     let mut start = None;
     if (weight.is_none() || stiffening.is_none()) && m > 3 {
+        let given = [weight, stiffening];
         let mut parts = Part::windows(&space, &data.points, &centred, side)?;
-        let (w, s, v) = search(unit, weight, stiffening, &mut |weight, stiffening| {
-            let (mut sum, mut count) = (0.0, 0);
-            for part in &mut parts {
-                let (s, c) = part.validate(weight, stiffening)?;
-                sum += s;
-                count += c;
-            }
-            Ok((sum / count.max(1) as f64).sqrt())
-        })?;
+        let (mut begin, mut steps) = (BEGIN, &STEPS[..]);
+        // A coarser surface finds nearly the same weights; the last steps are the fine one's.
+        if let (1, Some(coarse)) = (parts.len(), space.coarser().filter(|c| c.axes()[0].spans() >= 32)) {
+            let mut parts = Part::windows(&coarse, &data.points, &centred, side)?;
+            let found = search(unit, given, begin, &STEPS[..2], &mut |w, s| Part::validate_all(&mut parts, w, s))?;
+            (begin, steps) = ([found.0 / unit, found.1], &STEPS[2..]);
+        }
+        let (w, s, v) = search(unit, given, begin, steps, &mut |w, s| Part::validate_all(&mut parts, w, s))?;
         (weight, stiffening, validation) = (Some(w), Some(s), Some(v));
         if let [whole] = &mut parts[..] {
             start = whole.folds.first_mut().map(|f| std::mem::take(&mut f.x));
@@ -235,7 +235,7 @@ impl Part {
         let axes = space.axes();
         let spans = axes[0].spans();
         let share = (WINDOW / points.len() as f64).sqrt();
-        let few = ((spans as f64 * share).ceil() as usize).next_power_of_two().clamp(16, spans);
+        let few = ((spans as f64 * share).ceil() as usize).next_power_of_two().max(16).min(spans);
         if few == spans {
             let mut part = Part::new(space.clone(), points.to_vec(), values.to_vec(), side);
             part.leave_out(10, 10);
@@ -297,12 +297,23 @@ impl Part {
         Ok(())
     }
 
+    /// Root mean square of the predictions of what all folds leave out.
+    fn validate_all(parts: &mut [Part], weight: f64, stiffening: f64) -> Result<f64, FitError> {
+        let (mut sum, mut count) = (0.0, 0);
+        for part in parts {
+            let (s, c) = part.validate(weight, stiffening)?;
+            sum += s;
+            count += c;
+        }
+        Ok((sum / count.max(1) as f64).sqrt())
+    }
+
     /// Sum of squares and number of the predictions of what the folds leave out.
     fn validate(&mut self, weight: f64, stiffening: f64) -> Result<(f64, usize), FitError> {
         let (mut sum, mut count) = (0.0, 0);
         let mut folds = std::mem::take(&mut self.folds);
         for fold in &mut folds {
-            fold.x.fill(0.0);
+            // From the solution of the last weights: neighbours are alike.
             self.solve(fold, weight, stiffening, 1e-4)?;
             for &i in &fold.out {
                 sum += (eval(&self.spaces[0], &fold.x, self.points[i]) - self.values[i]).powi(2);

@@ -109,8 +109,8 @@ const MOST: usize = 400;
 /// Settings of the even speed's term, each followed to rest.
 const STAGES: usize = 40;
 /// A curve this much longer than at the start has no minimum.
-const LONG: f64 = 30.0;
-/// The longest move of a control point in a step, over the first length.
+const LONG: f64 = 10.0;
+/// The longest move of a control point in a step, over the length.
 const LEAP: f64 = 0.05;
 /// The damping at which nothing moves any more.
 const STUCK: f64 = 1e12;
@@ -295,7 +295,7 @@ impl IntrinsicSolver {
         let finite = value.gradient.iter().all(|v| v.is_finite());
         let change = found.step.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
         // A long step would leap over the nearest minimum to a loop.
-        if change > LEAP && !far {
+        if change > LEAP * speed::length(&self.objective, &self.x) && !far {
             self.by *= 4.0;
             return false;
         }
