@@ -65,6 +65,9 @@ pub(crate) enum Command {
   ondelette light room.glb -o room.png -o room.glb -o room.onl --report room.json
   ondelette light room.obj --two-sided --basis m3 --error 0.5% --max-time 2m
   ondelette light room.glb -o view.exr --camera eye=1,1.6,5:at=1,1,0:fov=50
+  ondelette light room.obj --method wavelet --basis m3 --solver gauss-seidel
+  ondelette light room.obj --method classical --error 10% --solver shooting
+  ondelette light room.obj --method galerkin --basis m2 --subdivision 3
 
 Ctrl-C stops the solver; what was asked for is written from the state reached, and the exit code is 1. A second \
 Ctrl-C ends the program at once.")]
@@ -78,14 +81,28 @@ pub(crate) struct LightArgs {
     #[arg(short = 'o', long = "output", value_name = "PATH")]
     pub(crate) outputs: Vec<PathBuf>,
 
-    /// Functions that light is represented in: haar, m1 to m6 (multiwavelets), f1 to f4 (flatlets)
-    #[arg(long, default_value = "m2", value_name = "NAME", allow_hyphen_values = true)]
-    pub(crate) basis: String,
+    /// Functions that light is represented in: haar, m1 to m6 (multiwavelets), f1 to f4 (flatlets) [default: m2; haar
+    /// for the methods classical and hierarchical, which have no other]
+    #[arg(long, value_name = "NAME", allow_hyphen_values = true)]
+    pub(crate) basis: Option<String>,
 
     /// How light is transported: sampled (direct light exact, reflected light by sampled rows of the transport
-    /// operator; scenes of any size) or wavelet (wavelet links between all pairs of surfaces; a few thousand surfaces)
+    /// operator; scenes of any size), or by links between pairs of elements (a few thousand surfaces): classical (equal
+    /// constant elements, full matrix), galerkin (equal elements of a higher order, full matrix), hierarchical (links
+    /// between constant elements of all sizes), wavelet (the same in any basis)
     #[arg(long, default_value = "sampled", value_name = "NAME", allow_hyphen_values = true)]
     pub(crate) method: String,
+
+    /// Methods with links: how the linear system is solved: gmres (fewest sweeps), jacobi, gauss-seidel, southwell
+    /// (shoots from the brightest element), shooting (progressive radiosity: from the brightest surface). All converge
+    /// to the same light [default: gmres]
+    #[arg(long, value_name = "NAME", allow_hyphen_values = true)]
+    pub(crate) solver: Option<String>,
+
+    /// Classical and galerkin: divide the longest edge of the scene into 2^N parts, shorter edges into parts no longer
+    /// than these [default: halved until the error is small enough]
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    pub(crate) subdivision: Option<String>,
 
     /// Mean absolute error of the irradiance that is allowed, in per cent of its mean: 1%, 0.5, 3%
     #[arg(long, default_value = "1%", value_name = "PERCENT", allow_hyphen_values = true)]

@@ -96,6 +96,9 @@ impl Record<'_> {
             },
             "settings": {
                 "basis": settings.basis.to_string(),
+                "method": settings.method.to_string(),
+                "solver": settings.method.has_links().then(|| settings.links.iteration.to_string()),
+                "subdivision": settings.links.subdivision,
                 "error": settings.error,
                 "two_sided": self.plan.two_sided,
                 "max_time_seconds": self.plan.max_time.map(|t| t.as_secs_f64()),
@@ -110,6 +113,7 @@ impl Record<'_> {
             "kernel_samples": statistics.kernel_samples,
             "rays": statistics.rays,
             "iterations": statistics.iterations,
+            "shots": statistics.shots,
             "residual": known(statistics.residual),
             "estimated_error": known(statistics.estimated_error),
             "surfaces": surfaces(solution),
@@ -149,10 +153,14 @@ impl Record<'_> {
                 None if self.ledger.is_some_and(|l| !self.closes(&l)) => {
                     "the energy ledger does not close: this result is not to be trusted".to_owned()
                 }
-                None => format!(
-                    "the tolerance of {} % is missed: no element may be split further",
-                    100.0 * solution.settings().error
-                ),
+                None => {
+                    let missed = format!("the tolerance of {} % is missed: ", 100.0 * solution.settings().error);
+                    match (statistics.too_large, solution.settings().links.subdivision) {
+                        (Some(matrix), _) => format!("{missed}{matrix}"),
+                        (None, Some(n)) => format!("{missed}a subdivision of {n} is too coarse"),
+                        (None, None) => format!("{missed}no element may be split further"),
+                    }
+                }
             };
             let known = if statistics.estimated_error.is_finite() { "" } else { " (before its first balance)" };
             let _ = writeln!(text, "{why}{known}");
@@ -166,10 +174,11 @@ impl Record<'_> {
         let (elements, links) = (solution.forest().leaves(), solution.links().len());
         writeln!(
             text,
-            "{}: {} sides, {elements} elements, {links} links, {} sweeps, {:.2} s",
+            "{}: {} sides, {elements} elements, {links} links, {} sweeps{}, {:.2} s",
             scene.name,
             scene.sides.len(),
             statistics.iterations,
+            if statistics.shots > 0 { format!(" and {} shots", statistics.shots) } else { String::new() },
             self.stages.total()
         )?;
         let wanted = 100.0 * solution.settings().error;

@@ -20,6 +20,16 @@ pub struct CoupleSettings {
     pub thorough: bool,
 }
 
+impl CoupleSettings {
+    /// All orders, no mask samples.
+    pub const EXACT: CoupleSettings = CoupleSettings { negligible: 0.0, samples: 0, thorough: false };
+
+    /// About how long a coupling takes in a basis of this order, in units of a few ten microseconds.
+    pub(crate) fn work(&self, order: usize) -> usize {
+        order.pow(4) / 4 + self.samples * (order + 2).pow(2) / 64 + 1
+    }
+}
+
 /// One block with its error measures. Strengths are for a shooter of constant value 1.
 #[derive(Clone, Debug)]
 pub struct Coupling {

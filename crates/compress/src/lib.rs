@@ -4,7 +4,8 @@
 //! integrated) -> [`mod@couple`] (one block of the operator, with what its own test samples say of its error) ->
 //! [`links`] (all blocks) -> [`estimate`] (where the error is, seen by an oracle that knows the magnitudes at both
 //! ends) -> [`refine`] (ProjectKernel, second form: links replaced by links between children) -> [`transport`] (pull,
-//! gather, push).
+//! gather, push). Beside them [`assembly`], the matrix that nothing compresses, and [`trees`], the passes one root at a
+//! time.
 //!
 //! The approximate operator is the congruence P^T M P: pull P takes finest coefficients to all levels, the links M join
 //! equal or unequal levels, push P^T brings the result down. The thesis splits both ends of a link; splitting one end
@@ -12,6 +13,7 @@
 //!
 //! This crate knows kernels and numbers, nothing of what they mean.
 
+pub mod assembly;
 pub mod cell;
 pub mod couple;
 pub mod estimate;
@@ -20,7 +22,9 @@ pub mod kernel;
 pub mod links;
 pub mod refine;
 pub mod transport;
+pub mod trees;
 
+pub use assembly::Assembly;
 pub use cell::Cell;
 pub use couple::{CoupleSettings, Coupling, couple};
 pub use estimate::{Estimate, Magnitudes};
@@ -28,3 +32,4 @@ pub use forest::{Forest, NodeId};
 pub use kernel::{Detail, Kernel, Masked, Pair};
 pub use links::{Link, Links};
 pub use refine::{End, Refinement, Task};
+pub use trees::Trees;

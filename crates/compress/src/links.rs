@@ -28,6 +28,23 @@ pub struct Link {
     pub unseen: f32,
 }
 
+impl Link {
+    fn of(receiver: NodeId, shooter: NodeId, block: u64, c: &Coupling) -> Self {
+        Link {
+            receiver,
+            shooter,
+            orders: c.orders,
+            masked: c.masked,
+            block,
+            residual: c.residual.map(|r| r as f32),
+            strength: c.strength as f32,
+            roughness: c.roughness as f32,
+            spread: c.spread as f32,
+            unseen: c.unseen as f32,
+        }
+    }
+}
+
 /// All links.
 #[derive(Clone, Debug, Default)]
 pub struct Links {
@@ -101,6 +118,23 @@ impl Links {
         }
     }
 
+    /// No links, and memory for as many.
+    pub(crate) fn with_room(links: usize, numbers: usize) -> Self {
+        Links { links: Vec::with_capacity(links), blocks: Vec::with_capacity(numbers), starts: Vec::new() }
+    }
+
+    /// Adds a link that comes after all others; [`Links::finish`] makes it found.
+    pub(crate) fn push(&mut self, receiver: NodeId, shooter: NodeId, coupling: &Coupling) {
+        debug_assert!(self.links.last().is_none_or(|l| (l.receiver, l.shooter) < (receiver, shooter)));
+        self.links.push(Link::of(receiver, shooter, self.blocks.len() as u64, coupling));
+        self.blocks.extend_from_slice(&coupling.block);
+    }
+
+    /// Makes pushed links found.
+    pub(crate) fn finish(&mut self, forest: &Forest) {
+        self.index(forest.len());
+    }
+
     /// Removes the links whose index is marked and adds new ones, in order. Cost linear in the links kept.
     ///
     /// # Panics
@@ -132,18 +166,7 @@ impl Links {
                 _ => {
                     let Some((receiver, shooter, c)) = fresh.next() else { break };
                     blocks.extend_from_slice(&c.block);
-                    links.push(Link {
-                        receiver,
-                        shooter,
-                        orders: c.orders,
-                        masked: c.masked,
-                        block: start,
-                        residual: c.residual.map(|r| r as f32),
-                        strength: c.strength as f32,
-                        roughness: c.roughness as f32,
-                        spread: c.spread as f32,
-                        unseen: c.unseen as f32,
-                    });
+                    links.push(Link::of(receiver, shooter, start, &c));
                 }
             }
         }

@@ -107,7 +107,7 @@ impl Refinement {
         while work < most && from + count < self.tasks.len() {
             let task = &self.tasks[from + count];
             let order = forest.basis_of(task.receiver.0).order();
-            work += order.pow(4) / 4 + task.settings.samples * (order + 2).pow(2) / 64 + 1;
+            work += task.settings.work(order);
             count += 1;
         }
         let cell = |(id, child): (NodeId, Option<u8>)| -> Cell {

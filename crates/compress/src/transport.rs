@@ -3,7 +3,7 @@
 //! Values are `[f64; C]` (C channels that share the operator), in the layout of [`Forest`]: `stride` slots a node.
 
 use crate::forest::{Forest, NodeId};
-use crate::links::Links;
+use crate::links::{Link, Links};
 use ondelette_numerics::par;
 
 fn add<const C: usize>(to: &mut [f64; C], k: f64, from: [f64; C]) {
@@ -20,19 +20,24 @@ pub fn pull<const C: usize>(forest: &Forest, values: &mut [[f64; C]]) {
     let stride = forest.stride();
     assert_eq!(values.len(), forest.len() * stride);
     for n in (0..forest.len()).rev() {
-        let id = NodeId(n as u32);
-        if forest.is_leaf(id) {
-            continue;
-        }
-        let basis = forest.basis_of(id);
-        let len = basis.len();
-        let (head, tail) = values.split_at_mut((n + 1) * stride);
-        let parent = &mut head[n * stride..n * stride + len];
-        parent.fill([0.0; C]);
-        for c in 0..basis.shape().arity() {
-            let at = forest.child(id, c).index() * stride - (n + 1) * stride;
-            basis.pull(c, &tail[at..at + len], parent, add);
-        }
+        pull_node(forest, NodeId(n as u32), values);
+    }
+}
+
+/// Fills one inner node from its children; leaves are left as they are.
+pub fn pull_node<const C: usize>(forest: &Forest, id: NodeId, values: &mut [[f64; C]]) {
+    if forest.is_leaf(id) {
+        return;
+    }
+    let (n, stride) = (id.index(), forest.stride());
+    let basis = forest.basis_of(id);
+    let len = basis.len();
+    let (head, tail) = values.split_at_mut((n + 1) * stride);
+    let parent = &mut head[n * stride..n * stride + len];
+    parent.fill([0.0; C]);
+    for c in 0..basis.shape().arity() {
+        let at = forest.child(id, c).index() * stride - (n + 1) * stride;
+        basis.pull(c, &tail[at..at + len], parent, add);
     }
 }
 
@@ -72,20 +77,31 @@ pub fn gather<const C: usize>(forest: &Forest, links: &Links, values: &[[f64; C]
             node.fill([0.0; C]);
             let id = NodeId((chunk * NODES + k) as u32);
             for link in links.of(id) {
-                let rows = forest.basis_of(id).truncated(usize::from(link.orders[0]));
-                let columns = forest.basis_of(link.shooter).truncated(usize::from(link.orders[1]));
-                let from = link.shooter.index() * stride;
-                let block = &links.blocks()[link.block as usize..][..rows.len() * columns.len()];
-                for (&i, row) in rows.iter().zip(block.chunks(columns.len())) {
-                    let mut sum = [0.0; C];
-                    for (&j, k) in columns.iter().zip(row) {
-                        add(&mut sum, *k, values[from + j as usize]);
-                    }
-                    add(&mut node[i as usize], 1.0, sum);
-                }
+                apply_link(forest, links, link, values, node);
             }
         }
     });
+}
+
+/// Adds what one link brings to the slots of its receiver.
+pub fn apply_link<const C: usize>(
+    forest: &Forest,
+    links: &Links,
+    link: &Link,
+    values: &[[f64; C]],
+    node: &mut [[f64; C]],
+) {
+    let rows = forest.basis_of(link.receiver).truncated(usize::from(link.orders[0]));
+    let columns = forest.basis_of(link.shooter).truncated(usize::from(link.orders[1]));
+    let from = link.shooter.index() * forest.stride();
+    let block = &links.blocks()[link.block as usize..][..rows.len() * columns.len()];
+    for (&i, row) in rows.iter().zip(block.chunks(columns.len())) {
+        let mut sum = [0.0; C];
+        for (&j, k) in columns.iter().zip(row) {
+            add(&mut sum, *k, values[from + j as usize]);
+        }
+        add(&mut node[i as usize], 1.0, sum);
+    }
 }
 
 /// The whole operator: pull, gather, push. Inner nodes of `values` are overwritten by their pulls; the answer is at the

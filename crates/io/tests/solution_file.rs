@@ -23,8 +23,11 @@ fn corner() -> Scene {
 }
 
 fn solve(basis: &str, error: f64) -> Solution {
-    let mut solver =
-        Solver::new(corner(), Settings { basis: basis.parse().unwrap(), method: Method::Wavelet, error }).unwrap();
+    let mut solver = Solver::new(
+        corner(),
+        Settings { basis: basis.parse().unwrap(), method: Method::Wavelet, error, ..Settings::default() },
+    )
+    .unwrap();
     while solver.step().is_some() {}
     solver.solution()
 }

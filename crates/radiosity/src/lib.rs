@@ -17,6 +17,6 @@ pub mod visible;
 pub use rgb::Rgb;
 pub use sampled::Kept;
 pub use scene::Scene;
-pub use settings::{Basis, Method, Settings};
+pub use settings::{Basis, Iteration, LinkSettings, Method, Settings};
 pub use solution::{Solution, Statistics};
-pub use solver::{Event, SolveError, Solver};
+pub use solver::{Event, MatrixTooLarge, SolveError, Solver};

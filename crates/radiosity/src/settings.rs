@@ -1,5 +1,11 @@
 //! What the user chooses.
 
+mod links;
+mod method;
+
+pub use links::{LinkSettings, LinkSettingsError};
+pub use method::{Iteration, IterationError, Method, MethodError};
+
 use ondelette_wavelet::cell::{CellBasis, CellFamily};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -23,6 +29,9 @@ pub struct Basis {
 }
 
 impl Basis {
+    /// Constants.
+    pub const HAAR: Basis = Basis { flatlet: false, order: 1 };
+
     /// The default: bilinear multiwavelets.
     pub const M2: Basis = Basis { flatlet: false, order: 2 };
 
@@ -72,42 +81,6 @@ impl FromStr for Basis {
     }
 }
 
-/// How light is transported.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Method {
-    /// Direct light exact, indirect light by sampled rows of the operator: scenes of any size.
-    #[default]
-    Sampled,
-    /// Wavelet links between pairs of elements.
-    Wavelet,
-}
-
-impl fmt::Display for Method {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Method::Sampled => "sampled",
-            Method::Wavelet => "wavelet",
-        })
-    }
-}
-
-/// A name that is no method.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("'{0}' is no method: choose sampled or wavelet")]
-pub struct MethodError(pub String);
-
-impl FromStr for Method {
-    type Err = MethodError;
-
-    fn from_str(name: &str) -> Result<Self, MethodError> {
-        match name {
-            "sampled" => Ok(Method::Sampled),
-            "wavelet" => Ok(Method::Wavelet),
-            _ => Err(MethodError(name.to_string())),
-        }
-    }
-}
-
 /// Settings of a solution; the same settings and scene give the same bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
@@ -117,11 +90,13 @@ pub struct Settings {
     pub method: Method,
     /// Promised error: area-weighted mean absolute error of the irradiance over its area-weighted mean, as a fraction.
     pub error: f64,
+    /// What methods with links are told; the default for others.
+    pub links: LinkSettings,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Settings { basis: Basis::M2, method: Method::Sampled, error: 0.01 }
+        Settings { basis: Basis::M2, method: Method::Sampled, error: 0.01, links: LinkSettings::default() }
     }
 }
 
@@ -131,11 +106,28 @@ pub enum SettingsError {
     /// The promised error is no number in the range we can keep.
     #[error("an error of {0} % makes no sense: give between 0.01 % and 100 %")]
     Error(f64),
+    /// Choices that do not go together.
+    #[error(transparent)]
+    Links(#[from] LinkSettingsError),
 }
 
 impl Settings {
-    /// Checks the numbers.
+    /// Checks the numbers, and that the choices go together.
+    ///
+    /// ```
+    /// use ondelette_radiosity::settings::{Method, Settings};
+    /// let settings = Settings { method: Method::Classical, ..Settings::default() };
+    /// // the default basis m2 is none of constant elements
+    /// assert!(settings.validated().unwrap_err().to_string().contains("galerkin"));
+    /// ```
+    ///
+    /// # Errors
+    /// [`SettingsError`].
     pub fn validated(self) -> Result<Self, SettingsError> {
-        if (1e-4..=1.0).contains(&self.error) { Ok(self) } else { Err(SettingsError::Error(100.0 * self.error)) }
+        if !(1e-4..=1.0).contains(&self.error) {
+            return Err(SettingsError::Error(100.0 * self.error));
+        }
+        links::validate(&self)?;
+        Ok(self)
     }
 }

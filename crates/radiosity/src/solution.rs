@@ -4,6 +4,7 @@ use crate::rgb::Rgb;
 use crate::sampled::Kept;
 use crate::scene::Scene;
 use crate::settings::Settings;
+use crate::solver::MatrixTooLarge;
 use glam::DVec3;
 use ondelette_compress::{Forest, Links, NodeId};
 use ondelette_wavelet::cell::CellShape;
@@ -25,6 +26,10 @@ pub struct Statistics {
     pub kernel_samples: u64,
     /// Visibility rays cast.
     pub rays: u64,
+    /// Shots of the solvers that shoot.
+    pub shots: u64,
+    /// The full matrix that would have been next, had it not been too large.
+    pub too_large: Option<MatrixTooLarge>,
 }
 
 /// Closer to an element's edge than this (in its local units) counts as on it.

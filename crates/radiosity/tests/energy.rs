@@ -7,7 +7,8 @@ use ondelette_radiosity::{Basis, Method, Rgb, Scene, Settings, Solution, Solver}
 
 fn solve(scene: Scene, basis: &str, error: f64) -> Solution {
     let basis: Basis = basis.parse().unwrap();
-    let mut solver = Solver::new(scene, Settings { basis, method: Method::Wavelet, error }).unwrap();
+    let mut solver =
+        Solver::new(scene, Settings { basis, method: Method::Wavelet, error, ..Settings::default() }).unwrap();
     while solver.step().is_some() {}
     let solution = solver.solution();
     assert!(solution.is_finished());

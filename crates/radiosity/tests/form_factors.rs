@@ -174,7 +174,9 @@ fn touching_unit_squares_exchange_what_howell_c14_says() {
     let scene = samples::quads("hinge", &[(floor, Rgb::BLACK, Rgb::BLACK), (wall, Rgb::BLACK, light)]);
     for name in ["haar", "m2", "m3", "f2"] {
         let basis: Basis = name.parse().unwrap();
-        let mut solver = Solver::new(scene.clone(), Settings { basis, method: Method::Wavelet, error: 0.01 }).unwrap();
+        let mut solver =
+            Solver::new(scene.clone(), Settings { basis, method: Method::Wavelet, error: 0.01, ..Settings::default() })
+                .unwrap();
         while solver.step().is_some() {}
         let got = solver.solution().mean_irradiance(0).0[0];
         assert!((got / 0.200043776075403 - 1.0).abs() < 1e-3, "{name}: {got}");

@@ -9,7 +9,8 @@ use ondelette_radiosity::{Basis, Event, Method, Rgb, Scene, Settings, Solution, 
 
 fn solve(scene: Scene, basis: &str, error: f64) -> Solution {
     let basis: Basis = basis.parse().unwrap();
-    let mut solver = Solver::new(scene, Settings { basis, method: Method::Sampled, error }).unwrap();
+    let mut solver =
+        Solver::new(scene, Settings { basis, method: Method::Sampled, error, ..Settings::default() }).unwrap();
     while solver.step().is_some() {}
     let solution = solver.into_solution();
     assert!(solution.is_finished());

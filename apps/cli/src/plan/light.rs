@@ -6,9 +6,12 @@ use crate::args::{DirectLight, LightArgs, RelightArgs};
 use crate::run::Refusal;
 use ondelette_io::Panel;
 use ondelette_io::write::{check_writable, elements_path};
-use ondelette_radiosity::Settings;
 use ondelette_radiosity::scene::Paint;
+use ondelette_radiosity::settings::{LinkSettingsError, SettingsError};
+use ondelette_radiosity::{Basis, Iteration, LinkSettings, Method, Settings};
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 use std::time::Duration;
 
 /// What an ending asks for.
@@ -111,13 +114,50 @@ pub(crate) struct LightPlan {
     report: Option<PathBuf>,
 }
 
+/// The flag's value, judged by its type.
+fn parsed<T: FromStr<Err: Display>>(flag: &str, value: &str) -> Result<T, Refusal> {
+    value.parse().map_err(|e| Refusal::new(format!("{flag}: {e}")))
+}
+
+/// What the solver is told.
+fn settings(args: &LightArgs) -> Result<Settings, Refusal> {
+    let method: Method = parsed("--method", &args.method)?;
+    let linked = [("--solver", &args.solver), ("--subdivision", &args.subdivision)];
+    if let Some((flag, _)) = linked.iter().find(|(_, value)| value.is_some() && !method.has_links()) {
+        return Err(Refusal::new(format!(
+            "{flag}: the method {method} has no links; it is for --method classical, galerkin, hierarchical or wavelet"
+        )));
+    }
+    let basis = match &args.basis {
+        Some(name) => parsed("--basis", name)?,
+        None if matches!(method, Method::Classical | Method::Hierarchical) => Basis::HAAR,
+        None => Basis::M2,
+    };
+    let links = LinkSettings {
+        iteration: args.solver.as_deref().map_or(Ok(Iteration::default()), |name| parsed("--solver", name))?,
+        subdivision: args.subdivision.as_deref().map(subdivision).transpose()?,
+    };
+    let settings = Settings { basis, method, error: values::percent(&args.error)?, links };
+    settings.validated().map_err(|e| {
+        let flag = match &e {
+            SettingsError::Error(_) => "--error",
+            SettingsError::Links(LinkSettingsError::Basis { .. }) => "--basis",
+            SettingsError::Links(_) => "--subdivision",
+        };
+        Refusal::new(format!("{flag}: {e}"))
+    })
+}
+
+fn subdivision(text: &str) -> Result<u8, Refusal> {
+    let most = LinkSettings::FINEST;
+    let refusal = || Refusal::new(format!("--subdivision {text}: give a whole number from 0 to {most}"));
+    text.parse().ok().filter(|n| *n <= most).ok_or_else(refusal)
+}
+
 impl LightPlan {
     /// Judges every flag, and whether named outputs can be written.
     pub(crate) fn new(args: &LightArgs) -> Result<Self, Refusal> {
-        let basis = args.basis.parse().map_err(|e| Refusal::new(format!("--basis: {e}")))?;
-        let method = args.method.parse().map_err(|e| Refusal::new(format!("--method: {e}")))?;
-        let settings = Settings { basis, method, error: values::percent(&args.error)? };
-        let settings = settings.validated().map_err(|e| Refusal::new(format!("--error: {e}")))?;
+        let settings = settings(args)?;
         let mut named = args.outputs.iter().map(|path| Output::new(path)).collect::<Result<Vec<_>, _>>()?;
         named.sort_by_key(|o| o.kind);
         let is_gltf =

@@ -51,6 +51,33 @@ fn the_report_tells_what_the_guide_promises() {
 }
 
 #[test]
+fn the_report_names_method_and_solver_and_counts_their_work() {
+    let place = Place::new();
+    room(&place);
+    let report = |flags: &str| -> Value {
+        place.run(&format!("light room.obj {flags} -o a.onl --report a.json")).with_code(0);
+        serde_json::from_slice(&place.read("a.json")).unwrap()
+    };
+    for (method, solver, basis) in [
+        ("classical", "shooting", "haar"),
+        ("galerkin", "gauss-seidel", "m2"),
+        ("hierarchical", "southwell", "haar"),
+        ("wavelet", "jacobi", "m2"),
+    ] {
+        let told = report(&format!("--method {method} --solver {solver} --error 20%"));
+        let said = |name: &str| told["settings"][name].as_str().map(str::to_owned);
+        assert_eq!([said("method"), said("solver"), said("basis")], [method, solver, basis].map(|s| Some(s.into())));
+        let shoots = matches!(solver, "shooting" | "southwell");
+        assert_eq!(told["shots"].as_u64().unwrap() > 0, shoots, "{method} {solver}");
+        assert!(told["iterations"].as_u64().unwrap() > 0);
+    }
+    assert!(report("--error 5%")["settings"]["solver"].is_null());
+    // a subdivision that is too coarse is a result that misses its tolerance
+    let ended = place.run("light room.obj --method classical --subdivision 1 --error 1% -o a.onl").with_code(1);
+    assert!(ended.err.contains("subdivision of 1 is too coarse"), "{}", ended.err);
+}
+
+#[test]
 fn every_ending_is_written_and_nothing_else() {
     let place = Place::new();
     room(&place);
@@ -135,9 +162,10 @@ fn help_mentions_every_flag_and_ends_with_0() {
     };
     let light = help("light --help");
     let flags = ["-o", "--basis", "--error", "--max-time", "--threads", "--two-sided", "--camera", "--report"];
+    let links = ["--method", "--solver", "--subdivision", "gauss-seidel", "progressive", "galerkin"];
     let values =
         [".glb", ".png", ".exr", ".csv", ".onl", "out/NAME", "haar", "f1 to f4", "eye=x,y,z", "builtin:cornell"];
-    for said in flags.into_iter().chain(values) {
+    for said in flags.into_iter().chain(values).chain(links) {
         assert!(light.contains(said), "no '{said}' in:\n{light}");
     }
     assert!(light.contains("Examples:"));

@@ -11,6 +11,7 @@ use crate::scene::{Paint, Scene};
 use crate::settings::{Method, Settings};
 use crate::solution::Solution;
 use linked::Linked;
+pub use linked::MatrixTooLarge;
 use std::sync::Arc;
 
 /// What a step did. Counts and residuals only: whoever listens adds the clock.
@@ -77,6 +78,9 @@ pub enum SolveError {
         /// The limit.
         most: usize,
     },
+    /// A full matrix asked for is too large.
+    #[error(transparent)]
+    Matrix(#[from] MatrixTooLarge),
     /// The settings make no sense.
     #[error(transparent)]
     Settings(#[from] crate::settings::SettingsError),
@@ -135,7 +139,7 @@ impl Solver {
         }
         Ok(Solver(match settings.method {
             Method::Sampled => Engine::Sampled(Box::new(Sampled::new(scene, settings)?)),
-            Method::Wavelet => Engine::Linked(Box::new(Linked::new(scene, settings)?)),
+            _ => Engine::Linked(Box::new(Linked::new(scene, settings)?)),
         }))
     }
 

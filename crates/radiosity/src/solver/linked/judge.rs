@@ -1,0 +1,162 @@
+//! How far the solution is from the truth, and what to do about it.
+
+use super::guess::rays_for;
+use super::{DEEPEST, Event, Linked, Phase};
+use crate::rgb::Rgb;
+use ondelette_compress::{CoupleSettings, End, Estimate, Link, Magnitudes, Refinement, transport};
+
+/// Fewest rays of a receiver point in the last look at a masked pair.
+const LEAST_LAST_RAYS: usize = 32;
+/// Share of the promise aimed at, so that the last look at the links does not break it.
+const AIM: f64 = 0.97;
+/// Sweeps that follow a bias through the scene.
+const CARRIED_SWEEPS: usize = 4;
+
+impl Linked {
+    /// What a signed error of the irradiance becomes by reflection: the integral of its absolute value over all further
+    /// bounces. A few sweeps, then a geometric tail.
+    fn carried(&self, bias: &[[f64; 3]]) -> f64 {
+        let stride = self.forest.stride();
+        let mut error = vec![[0.0; 3]; self.irradiance.len()];
+        for (n, node) in self.forest.nodes().iter().enumerate() {
+            let basis = self.forest.basis(node.cell.shape);
+            let constant = if basis.is_nested() { 1 } else { basis.len() };
+            error[n * stride..n * stride + constant].fill(bias[n]);
+        }
+        let size = |e: &[[f64; 3]]| self.leaf_sum(|slot| Rgb(e[slot].map(f64::abs)));
+        let (mut sum, mut last, mut ratio) = (0.0, size(&error), 0.0);
+        for _ in 0..CARRIED_SWEEPS {
+            let mut values = self.radiosity(&error, false);
+            self.transport(&mut values, &mut error);
+            let now = size(&error);
+            sum += now;
+            ratio = if last > 0.0 { (now / last).min(0.99) } else { 0.0 };
+            last = now;
+        }
+        sum + last * ratio / (1.0 - ratio)
+    }
+
+    /// Estimates the error; finishes, tightens the solve, or starts the next batch of refinement.
+    pub(super) fn judge(&mut self) -> Event {
+        let mut values = self.radiosity(&self.irradiance, true);
+        transport::pull(&self.forest, &mut values);
+        let magnitudes = Magnitudes::of(&self.forest, &values);
+        let estimate = Estimate::of(&self.forest, &self.links, &magnitudes, |root| self.counts(root));
+        let mean = self.mean_irradiance();
+        let whole = mean.sum() * self.counted_area;
+        // a bias is carried on by every reflection, scatter is not; and the equations are only solved so far
+        let unsolved = self.statistics.residual * whole / (1.0 - self.highest_reflectance());
+        let missed = estimate.total + self.carried(&estimate.bias) + unsolved;
+        self.error = if whole > 0.0 { missed / whole } else { 0.0 };
+        let event = Event::Solved { error: self.error, links: self.links.len(), elements: self.forest.leaves() };
+        if self.uniform.is_some() {
+            self.proceed_uniformly();
+        } else {
+            self.know_present(&values);
+            self.proceed(&estimate, &magnitudes, mean.sum());
+        }
+        event
+    }
+
+    /// After a balance of a full matrix: done, tighten the solve, or halve the elements.
+    fn proceed_uniformly(&mut self) {
+        if self.error > self.settings.error {
+            self.halve_elements();
+        } else if self.strict {
+            self.phase = Phase::Finished;
+        } else {
+            self.strict = true;
+            self.start_solving();
+        }
+    }
+
+    /// After a balance of adapting links: done, tighten the solve, look again at what is masked, or refine. `unit` is
+    /// the mean irradiance, channels summed.
+    fn proceed(&mut self, estimate: &Estimate<3>, magnitudes: &Magnitudes<3>, unit: f64) {
+        let settings = |k: u32| {
+            let link = self.links.as_slice()[k as usize];
+            let shot: f64 = magnitudes.mean[link.shooter.index()].iter().sum();
+            let share = f64::from(link.strength) * shot / unit;
+            let samples = rays_for(share, self.settings.error, 4);
+            let negligible = if shot > 0.0 { 0.003 * self.settings.error * unit / shot } else { 0.0 };
+            CoupleSettings { negligible, samples, thorough: false }
+        };
+        // the first time good enough, with a little to spare: renew; then tighten; then done
+        let enough = if self.renewed { 1.0 } else { AIM };
+        if self.error <= enough * self.settings.error {
+            if !self.renewed {
+                self.renewed = true;
+                let chosen = self.worth_renewing(magnitudes);
+                if !chosen.is_empty() {
+                    let thorough = |k: u32| {
+                        let usual = settings(k);
+                        CoupleSettings { samples: usual.samples.max(LEAST_LAST_RAYS), thorough: true, ..usual }
+                    };
+                    self.phase = Phase::Renewing(Refinement::renewing(&self.links, &chosen, thorough));
+                    return;
+                }
+            }
+            if self.strict {
+                self.phase = Phase::Finished;
+            } else {
+                self.strict = true;
+                self.start_solving();
+            }
+            return;
+        }
+        self.strict = false;
+        self.renewed = false;
+        let target = self.settings.error * unit * self.counted_area;
+        let wanted = (estimate.total - 0.5 * target).min(0.6 * estimate.total).max(0.2 * estimate.total);
+        let may_split = |k: u32| {
+            let link = self.links.as_slice()[k as usize];
+            let id = if estimate.ends[k as usize] == End::Receiver { link.receiver } else { link.shooter };
+            self.forest.node(id).cell.depth < DEEPEST
+        };
+        let chosen: Vec<(u32, End)> = estimate
+            .largest(wanted, (self.links.len() / 2).max(64), may_split)
+            .into_iter()
+            .map(|k| (k, estimate.ends[k as usize]))
+            .collect();
+        if chosen.is_empty() {
+            self.stalled = true;
+            self.phase = Phase::Finished;
+            return;
+        }
+        self.phase = Phase::Refining(Refinement::splitting(&self.forest, &self.links, &chosen, settings));
+    }
+
+    /// Gives the kernel the radiosity as it stands.
+    fn know_present(&mut self, pulled: &[[f64; 3]]) {
+        let values = pulled.iter().map(|v| [v[0] + v[1] + v[2]]).collect();
+        self.kernel.set_present(self.forest.clone(), values);
+    }
+
+    /// The links that deserve a last look: those that make up nearly all of what detail and mask do together, and those
+    /// of which the first few rays saw nothing, which no refinement would ever look at again.
+    fn worth_renewing(&self, magnitudes: &Magnitudes<3>) -> Vec<u32> {
+        let links = self.links.as_slice();
+        let stakes: Vec<f64> = links
+            .iter()
+            .map(|l| {
+                let detail: f64 = magnitudes.detail[l.shooter.index()].iter().sum();
+                self.forest.node(l.receiver).measure * f64::from(l.spread + l.roughness) * detail
+            })
+            .collect();
+        let whole: f64 = stakes.iter().sum();
+        let mut order: Vec<u32> = (0..stakes.len() as u32).filter(|&k| stakes[k as usize] > 0.0).collect();
+        order.sort_by(|&a, &b| stakes[b as usize].total_cmp(&stakes[a as usize]).then(a.cmp(&b)));
+        let mut sum = 0.0;
+        let enough = order.iter().take_while(|&&k| {
+            let before = sum;
+            sum += stakes[k as usize];
+            before < 0.98 * whole
+        });
+        let mut chosen: Vec<u32> = enough.copied().collect();
+        let unseen = |l: &Link| l.masked && l.strength == 0.0 && l.unseen > 0.0;
+        chosen.extend((0..links.len() as u32).filter(|&k| unseen(&links[k as usize])));
+        chosen.sort_unstable();
+        chosen.dedup();
+        chosen
+    }
+}

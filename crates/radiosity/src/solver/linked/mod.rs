@@ -1,0 +1,211 @@
+//! The engine with links: link, solve, see where the error is, refine there, solve again (thesis 4.5, multigridding).
+//!
+//! A resumable state machine: every [`Solver::step`](super::Solver::step) does a bounded piece of work and says what it
+//! did. Stop stepping to pause or cancel; the solution is valid after any step.
+//!
+//! The unknown is the irradiance E of each side: E = K (M + rho E), with M = pi L the exitance of emitters. Reflectance
+//! multiplies at the shooter when light leaves again, so three colours share one set of links.
+//!
+//! The methods of thesis Fig. 15 share all of it but where links are: `hierarchical` and `wavelet` refine the links
+//! that an oracle points at ([`judge`]), `classical` and `galerkin` couple all elements of one size and halve that size
+//! ([`uniform`]). [`balance`] solves the linear system; [`measure`] integrates; [`guess`] says how many rays a pair gets.
+
+mod balance;
+mod guess;
+mod judge;
+mod measure;
+mod uniform;
+
+use super::{Event, SolveError};
+use crate::kernel::LightKernel;
+use crate::scene::Scene;
+use crate::settings::Settings;
+use crate::solution::{Solution, Statistics};
+use balance::Balance;
+use guess::Guess;
+use ondelette_compress::{Forest, Links, NodeId, Refinement, Task, transport};
+use std::sync::Arc;
+pub use uniform::MatrixTooLarge;
+use uniform::{Uniform, Weaving};
+
+enum Phase {
+    Linking(Refinement),
+    /// Coupling all pairs of a full matrix.
+    Weaving(Weaving),
+    Solving(Balance),
+    Refining(Refinement),
+    /// Coupling masked links anew with the radiosity that is known at last.
+    Renewing(Refinement),
+    Finished,
+}
+
+/// The stepped solver.
+pub(super) struct Linked {
+    scene: Arc<Scene>,
+    settings: Settings,
+    kernel: LightKernel,
+    forest: Forest,
+    links: Links,
+    irradiance: Vec<[f64; 3]>,
+    phase: Phase,
+    /// How fine a full matrix is; `None` where links adapt.
+    uniform: Option<Uniform>,
+    /// Whether the present solve goes to the final tolerance.
+    strict: bool,
+    /// Area of the sides that the promise counts.
+    counted_area: f64,
+    /// Integral of the irradiance over counted sides, channels summed: what residuals are measured against.
+    whole: f64,
+    /// Whether nothing is left to do although the promise is not kept.
+    stalled: bool,
+    /// Whether the masked links were coupled anew since the last refinement.
+    renewed: bool,
+    error: f64,
+    statistics: Statistics,
+}
+
+/// Sides up to which all pairs are linked.
+pub(super) const MOST_SIDES: usize = 6_000;
+/// Work a step, in units of a few ten microseconds: some ten milliseconds in all.
+const WORK_A_STEP: usize = 1024;
+/// Rays of a receiver point in the first, coarse linking.
+const COARSE_RAYS: usize = 16;
+/// Deepest split.
+const DEEPEST: u32 = 16;
+
+impl Linked {
+    /// Prepares a scene. Nothing is linked yet.
+    ///
+    /// # Errors
+    /// See [`SolveError`].
+    pub(super) fn new(scene: Scene, settings: Settings) -> Result<Self, SolveError> {
+        if scene.sides.len() > MOST_SIDES {
+            return Err(SolveError::TooManySides { sides: scene.sides.len(), most: MOST_SIDES });
+        }
+        let kernel = LightKernel::new(&scene);
+        let mut forest = Forest::new(settings.basis.family(), usize::from(settings.basis.order))
+            .expect("a parsed basis has a valid order");
+        for side in kernel.sides() {
+            forest.add_root(side.shape, side.area);
+        }
+        let irradiance = vec![[0.0; 3]; forest.len() * forest.stride()];
+        let counted = scene.sides.iter().zip(kernel.sides()).filter(|(s, _)| !scene.material(**s).is_pure_emitter());
+        let counted_area = counted.map(|(_, frame)| frame.area).sum();
+        let mut engine = Linked {
+            scene: Arc::new(scene),
+            settings,
+            kernel,
+            forest,
+            links: Links::new(),
+            irradiance,
+            phase: Phase::Finished,
+            uniform: None,
+            strict: false,
+            counted_area,
+            whole: 0.0,
+            stalled: false,
+            renewed: false,
+            error: f64::INFINITY,
+            statistics: Statistics::default(),
+        };
+        if settings.method.is_full() {
+            engine.start_weaving(settings.links.subdivision.map(u32::from))?;
+        } else {
+            engine.phase = Phase::Linking(Refinement::linking(engine.pairs_of_sides()));
+        }
+        Ok(engine)
+    }
+
+    /// All pairs of sides that face each other.
+    fn pairs_of_sides(&self) -> Vec<Task> {
+        let guess = Guess::of(&self.scene, &self.kernel, self.settings.error);
+        let mut tasks = Vec::new();
+        for (r, &receiver) in self.forest.roots().iter().enumerate() {
+            for (s, &shooter) in self.forest.roots().iter().enumerate() {
+                if self.kernel.may_see(r, s) {
+                    tasks.push(Task::between(receiver, shooter, guess.settings(&self.scene, &self.kernel, r, s)));
+                }
+            }
+        }
+        tasks
+    }
+
+    /// The scene being solved.
+    pub(super) fn scene(&self) -> &Arc<Scene> {
+        &self.scene
+    }
+
+    /// Does a bounded piece of work; `None` when the promise is kept, or when nothing is left to refine
+    /// ([`Statistics::finished`] says which).
+    pub(super) fn step(&mut self) -> Option<Event> {
+        match std::mem::replace(&mut self.phase, Phase::Finished) {
+            Phase::Linking(batch) => {
+                Some(self.work(batch, |done, total| Event::Linking { done, total }, Phase::Linking))
+            }
+            Phase::Refining(batch) => {
+                Some(self.work(batch, |done, total| Event::Refining { done, total }, Phase::Refining))
+            }
+            Phase::Renewing(batch) => {
+                Some(self.work(batch, |done, total| Event::Refining { done, total }, Phase::Renewing))
+            }
+            Phase::Weaving(weaving) => Some(self.weave(weaving)),
+            Phase::Solving(balance) => Some(self.iterate(balance)),
+            Phase::Finished => None,
+        }
+    }
+
+    /// The state as it stands, valid after any step.
+    pub(super) fn solution(&self) -> Solution {
+        Solution::new(
+            self.scene.clone(),
+            self.settings,
+            self.forest.clone(),
+            self.links.clone(),
+            self.irradiance.clone(),
+            self.present_statistics(),
+        )
+    }
+
+    /// The state as it stands, without a copy: for the end.
+    pub(super) fn into_solution(self) -> Solution {
+        let statistics = self.present_statistics();
+        Solution::new(self.scene, self.settings, self.forest, self.links, self.irradiance, statistics)
+    }
+
+    fn present_statistics(&self) -> Statistics {
+        let mut statistics = self.statistics.clone();
+        statistics.estimated_error = self.error;
+        statistics.finished = matches!(self.phase, Phase::Finished) && !self.stalled;
+        statistics
+    }
+
+    fn work(
+        &mut self,
+        mut batch: Refinement,
+        event: impl Fn(usize, usize) -> Event,
+        phase: impl Fn(Refinement) -> Phase,
+    ) -> Event {
+        let (finished, samples) = batch.step(&self.kernel, &self.forest, WORK_A_STEP);
+        self.statistics.kernel_samples += samples;
+        self.statistics.rays = self.kernel.rays_cast();
+        let event = event(batch.done(), batch.len());
+        if !finished {
+            self.phase = phase(batch);
+            return event;
+        }
+        let split = batch.commit(&mut self.forest, &mut self.links);
+        self.inherit(split);
+        self.start_solving();
+        event
+    }
+
+    /// Hands the irradiance of nodes that were split on to their children.
+    fn inherit(&mut self, split: Vec<NodeId>) {
+        let stride = self.forest.stride();
+        self.irradiance.resize(self.forest.len() * stride, [0.0; 3]);
+        for id in split {
+            transport::push_node(&self.forest, id, &mut self.irradiance);
+            self.irradiance[id.index() * stride..(id.index() + 1) * stride].fill([0.0; 3]);
+        }
+    }
+}
