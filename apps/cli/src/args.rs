@@ -68,6 +68,9 @@ pub(crate) enum Command {
   ondelette light room.obj --method wavelet --basis m3 --solver gauss-seidel
   ondelette light room.obj --method classical --error 10% --solver shooting
   ondelette light room.obj --method galerkin --basis m2 --subdivision 3
+  ondelette light room.obj --method hierarchical --error 5% --oracle magnitude
+  ondelette light room.obj --method wavelet --basis m3 --decomposition standard --error 5%
+  ondelette light room.obj --method wavelet --basis auto --oracle fit --weight variation
 
 Ctrl-C stops the solver; what was asked for is written from the state reached, and the exit code is 1. A second \
 Ctrl-C ends the program at once.")]
@@ -81,8 +84,9 @@ pub(crate) struct LightArgs {
     #[arg(short = 'o', long = "output", value_name = "PATH")]
     pub(crate) outputs: Vec<PathBuf>,
 
-    /// Functions that light is represented in: haar, m1 to m6 (multiwavelets), f1 to f4 (flatlets) [default: m2; haar
-    /// for the methods classical and hierarchical, which have no other]
+    /// Functions that light is represented in: haar, m1 to m6 (multiwavelets), f1 to f4 (flatlets); with --method
+    /// wavelet also auto (an order for each link, m1 to m4, by what it promises for the work) [default: m2; haar for the
+    /// methods classical and hierarchical, which have no other]
     #[arg(long, value_name = "NAME", allow_hyphen_values = true)]
     pub(crate) basis: Option<String>,
 
@@ -99,7 +103,23 @@ pub(crate) struct LightArgs {
     #[arg(long, value_name = "NAME", allow_hyphen_values = true)]
     pub(crate) solver: Option<String>,
 
-    /// Classical and galerkin: divide the longest edge of the scene into 2^N parts, shorter edges into parts no longer
+    /// Hierarchical and wavelet: what decides which links are refined: error (what refining takes off the estimated
+    /// error), fit (how far a polynomial misses the kernel), magnitude (the form factor) [default: error]
+    #[arg(long, value_name = "NAME", allow_hyphen_values = true)]
+    pub(crate) oracle: Option<String>,
+
+    /// Hierarchical and wavelet: what the oracle's test is weighted with: brightness (of the shooter), variation (of the
+    /// shooter's radiosity beyond its basis), none [default: variation for the oracle error, brightness for the others]
+    #[arg(long, value_name = "NAME", allow_hyphen_values = true)]
+    pub(crate) weight: Option<String>,
+
+    /// Hierarchical and wavelet: nonstandard (links between elements of any size) or standard (the full matrix of equal
+    /// elements, transformed on both axes, small terms dropped; the report counts what either keeps) [default:
+    /// nonstandard]
+    #[arg(long, value_name = "NAME", allow_hyphen_values = true)]
+    pub(crate) decomposition: Option<String>,
+
+    /// Classical, galerkin and the standard decomposition: divide the longest edge of the scene into 2^N parts, shorter edges into parts no longer
     /// than these [default: halved until the error is small enough]
     #[arg(long, value_name = "N", allow_hyphen_values = true)]
     pub(crate) subdivision: Option<String>,

@@ -3,7 +3,7 @@
 use crate::interrupt::Reason;
 use crate::plan::light::LightPlan;
 use ondelette_radiosity::ledger::Ledger;
-use ondelette_radiosity::{Rgb, Solution};
+use ondelette_radiosity::{Method, Rgb, Solution};
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -63,6 +63,12 @@ impl Record<'_> {
             && self.ledger.is_none_or(|l| self.closes(&l))
     }
 
+    /// Whether an oracle refines links.
+    fn refines(&self) -> bool {
+        let settings = self.solution.settings();
+        settings.method.has_links() && !settings.is_uniform()
+    }
+
     /// Whether the ledger closes as far as the promised error allows: more energy than that cannot go astray unless the
     /// scene has something that the solver misjudges.
     fn closes(&self, ledger: &Ledger) -> bool {
@@ -95,9 +101,13 @@ impl Record<'_> {
                 "warnings": scene.warnings,
             },
             "settings": {
-                "basis": settings.basis.to_string(),
+                "basis": if settings.links.graded { "auto".into() } else { settings.basis.to_string() },
                 "method": settings.method.to_string(),
                 "solver": settings.method.has_links().then(|| settings.links.iteration.to_string()),
+                "oracle": self.refines().then(|| settings.links.oracle.to_string()),
+                "weight": self.refines().then(|| settings.links.weight().to_string()),
+                "decomposition": matches!(settings.method, Method::Hierarchical | Method::Wavelet)
+                    .then(|| settings.links.decomposition.to_string()),
                 "subdivision": settings.links.subdivision,
                 "error": settings.error,
                 "two_sided": self.plan.two_sided,
@@ -110,6 +120,9 @@ impl Record<'_> {
             "seconds": seconds,
             "elements": forest.leaves(),
             "links": { "total": solution.links().len(), "by_level": levels },
+            "terms": statistics.terms.map(|terms| {
+                json!({ "full": terms.full, "standard": terms.standard, "nonstandard": terms.nonstandard })
+            }),
             "kernel_samples": statistics.kernel_samples,
             "rays": statistics.rays,
             "iterations": statistics.iterations,
@@ -188,6 +201,10 @@ impl Record<'_> {
             writeln!(text, "error    {error:.3} % of the mean {name} (estimated; {wanted} % asked)")?;
         } else {
             writeln!(text, "error    not known yet ({wanted} % asked)")?;
+        }
+        if let Some(terms) = statistics.terms {
+            let [standard, nonstandard] = [terms.standard, terms.nonstandard];
+            writeln!(text, "terms    {} in all; kept {standard} (standard), {nonstandard} (nonstandard)", terms.full)?;
         }
         if let Some(ledger) = &self.ledger {
             let power = |p: Rgb| significant(p.sum() * square_metre(solution));

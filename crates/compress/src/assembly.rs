@@ -76,14 +76,8 @@ impl Assembly {
         let made = par::map(count, |i| {
             let (r, s) = self.pair(self.done + i);
             let settings = settings(r, s)?;
-            let coupling = couple(
-                kernel,
-                &forest.node(r).cell,
-                forest.basis_of(r),
-                &forest.node(s).cell,
-                forest.basis_of(s),
-                settings,
-            )?;
+            let (receiver, shooter) = (&forest.node(r).cell, &forest.node(s).cell);
+            let coupling = couple(kernel, receiver, forest.basis_of(r), shooter, forest.basis_of(s), settings)?;
             Some((r, s, coupling))
         });
         let mut samples = 0;

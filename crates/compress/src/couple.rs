@@ -11,7 +11,10 @@ pub const CHILDREN: usize = 4;
 /// How exactly to couple a pair.
 #[derive(Clone, Copy, Debug)]
 pub struct CoupleSettings {
-    /// A change of the result (for a unit shooter) that does not matter: higher orders below it are dropped.
+    /// Orders of receiver and shooter; where they are above that of the forest's basis, that.
+    pub orders: [u8; 2],
+    /// A change of the result (for a unit shooter) that does not matter: higher orders below it are dropped. Negative:
+    /// none is.
     pub negligible: f64,
     /// Most mask samples for one receiver point.
     pub samples: usize,
@@ -22,7 +25,8 @@ pub struct CoupleSettings {
 
 impl CoupleSettings {
     /// All orders, no mask samples.
-    pub const EXACT: CoupleSettings = CoupleSettings { negligible: 0.0, samples: 0, thorough: false };
+    pub const EXACT: CoupleSettings =
+        CoupleSettings { orders: [u8::MAX; 2], negligible: 0.0, samples: 0, thorough: false };
 
     /// About how long a coupling takes in a basis of this order, in units of a few ten microseconds.
     pub(crate) fn work(&self, order: usize) -> usize {

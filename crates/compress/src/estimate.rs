@@ -8,30 +8,34 @@
 use crate::couple::CHILDREN;
 use crate::forest::{Forest, NodeId};
 use crate::links::Links;
-use crate::refine::End;
 use ondelette_numerics::par;
+use ondelette_wavelet::cell::CellShape;
 
 /// What every node shoots: its mean, and the root mean square of its detail below the node's own basis.
 #[derive(Clone, Debug)]
 pub struct Magnitudes<const C: usize> {
     /// Mean of the function over the node.
     pub mean: Vec<[f64; C]>,
-    /// Root mean square of what the node's own coefficients leave out.
-    pub detail: Vec<[f64; C]>,
+    /// [`Magnitudes::detail`] by node and order.
+    details: Vec<[f64; C]>,
+    orders: usize,
 }
 
 impl<const C: usize> Magnitudes<C> {
-    /// Of pulled values (see [`crate::transport::pull`]).
-    pub fn of(forest: &Forest, values: &[[f64; C]]) -> Self {
+    /// Of pulled values (see [`crate::transport::pull`]). With `graded`, links have orders of their own, and what a lower
+    /// order leaves out is detail too; else what links were coupled without does not matter.
+    pub fn of(forest: &Forest, values: &[[f64; C]], graded: bool) -> Self {
         let stride = forest.stride();
+        let orders = forest.basis(CellShape::Square).order();
         let mut mean = vec![[0.0; C]; forest.len()];
-        let mut detail = vec![[0.0; C]; forest.len()];
+        let mut details = vec![[0.0; C]; forest.len() * orders];
         let mut square = vec![[0.0; C]; forest.len()];
         for n in (0..forest.len()).rev() {
             let id = NodeId(n as u32);
             let basis = forest.basis_of(id);
             let own = &values[n * stride..n * stride + basis.len()];
             mean[n] = basis.mean(own, [0.0; C], |a, b, k| std::array::from_fn(|c| a[c] + k * b[c]));
+            let mut detail = [0.0; C];
             if forest.is_leaf(id) {
                 let scale = if basis.is_nested() { 1.0 } else { 1.0 / basis.len() as f64 };
                 square[n] = std::array::from_fn(|c| scale * own.iter().map(|v| v[c] * v[c]).sum::<f64>());
@@ -44,12 +48,29 @@ impl<const C: usize> Magnitudes<C> {
                         square[n][c] += square[child][c] / arity as f64;
                     }
                 }
-                for c in 0..C {
-                    detail[n][c] = (square[n][c] - norm[c]).max(0.0).sqrt();
+                detail = std::array::from_fn(|c| (square[n][c] - norm[c]).max(0.0));
+            }
+            let own_details = &mut details[n * orders..(n + 1) * orders];
+            own_details.fill(detail);
+            if graded && basis.is_nested() {
+                for (order, detail) in own_details.iter_mut().enumerate() {
+                    let kept = basis.truncated(order + 1);
+                    for (_, v) in own.iter().enumerate().filter(|(j, _)| !kept.contains(&(*j as u16))) {
+                        (0..C).for_each(|c| detail[c] += v[c] * v[c]);
+                    }
                 }
             }
+            own_details.iter_mut().for_each(|d| *d = d.map(f64::sqrt));
         }
-        Magnitudes { mean, detail }
+        Magnitudes { mean, details, orders }
+    }
+
+    /// Root mean square of what the node's own coefficients of the first `order` orders leave out.
+    ///
+    /// # Panics
+    /// If there is no such node or order.
+    pub fn detail(&self, node: usize, order: u8) -> &[f64; C] {
+        &self.details[node * self.orders + usize::from(order) - 1]
     }
 }
 
@@ -60,10 +81,8 @@ pub struct Estimate<const C: usize> {
     pub total: f64,
     /// Mean signed error of each node (of leaves; inner nodes 0): what the operator would carry on as a bias.
     pub bias: Vec<[f64; C]>,
-    /// Share of [`Estimate::total`] that refining each link addresses, by link index.
-    pub gains: Vec<f32>,
-    /// Which end of each link to split.
-    pub ends: Vec<End>,
+    /// Of what the links of each node miss in absolute terms, the share that does not cancel with other links' misses.
+    pub share: Vec<f64>,
 }
 
 #[derive(Clone, Copy)]
@@ -83,11 +102,12 @@ impl<const C: usize> Estimate<C> {
             for link in links.of(NodeId(n as u32)) {
                 let s = link.shooter.index();
                 let mut unsigned = 0.0;
+                let detail = magnitudes.detail(s, link.orders[1]);
                 for c in 0..C {
                     let mean = magnitudes.mean[s][c];
-                    let u = f64::from(link.roughness) * magnitudes.detail[s][c];
+                    let u = f64::from(link.roughness) * detail[c];
                     let v = f64::from(link.unseen) * mean;
-                    let w = f64::from(link.spread) * magnitudes.detail[s][c];
+                    let w = f64::from(link.spread) * detail[c];
                     m.square[c] += u * u + v * v + w * w;
                     unsigned += u + v.abs() + w;
                     for q in 0..CHILDREN {
@@ -149,50 +169,7 @@ impl<const C: usize> Estimate<C> {
                 }
             }
         }
-        let judged = par::map(links.len(), |k| {
-            let link = &links.as_slice()[k];
-            let (r, s) = (link.receiver.index(), link.shooter.index());
-            let node = &forest.nodes()[r];
-            let arity = node.cell.shape.arity();
-            let (mut receiver, mut shooter, mut unseen) = (0.0, 0.0, 0.0);
-            for c in 0..C {
-                let mean = magnitudes.mean[s][c].abs();
-                receiver +=
-                    link.residual[..arity].iter().map(|d| f64::from(d.abs())).sum::<f64>() / arity as f64 * mean;
-                shooter += f64::from(link.roughness + link.spread) * magnitudes.detail[s][c];
-                unseen += f64::from(link.unseen) * mean;
-            }
-            let share = if absolute[r] > 0.0 { (error[r] / absolute[r]).min(1.0) } else { 0.0 };
-            let gain = node.measure * (receiver + shooter + unseen) * share;
-            let end = if unseen > receiver && unseen > shooter {
-                if node.measure >= forest.nodes()[s].measure { End::Receiver } else { End::Shooter }
-            } else if shooter > receiver && forest.nodes()[s].first_child != 0 {
-                End::Shooter
-            } else {
-                End::Receiver
-            };
-            (gain as f32, end)
-        });
-        let (gains, ends) = judged.into_iter().unzip();
-        Estimate { total, bias, gains, ends }
-    }
-
-    /// The links that `may` be split with the largest gains, which together address `wanted`, at most `most` of them;
-    /// ties to the lower index.
-    pub fn largest(&self, wanted: f64, most: usize, may: impl Fn(u32) -> bool) -> Vec<u32> {
-        let worth = |&k: &u32| self.gains[k as usize] > 0.0 && may(k);
-        let mut order: Vec<u32> = (0..self.gains.len() as u32).filter(worth).collect();
-        order.sort_by(|&a, &b| self.gains[b as usize].total_cmp(&self.gains[a as usize]).then(a.cmp(&b)));
-        let mut sum = 0.0;
-        let mut chosen = Vec::new();
-        for k in order.into_iter().take(most) {
-            if sum >= wanted {
-                break;
-            }
-            sum += f64::from(self.gains[k as usize]);
-            chosen.push(k);
-        }
-        chosen.sort_unstable();
-        chosen
+        let share = (0..forest.len()).map(|n| if absolute[n] > 0.0 { (error[n] / absolute[n]).min(1.0) } else { 0.0 });
+        Estimate { total, bias, share: share.collect() }
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::cell::Cell;
 use ondelette_wavelet::cell::{CellBasis, CellFamily, CellShape, OrderError};
+use std::sync::Arc;
 
 /// Index of a node of a [`Forest`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -47,6 +48,8 @@ pub struct Forest {
     nodes: Vec<Node>,
     roots: Vec<NodeId>,
     bases: [CellBasis; 3],
+    /// The same of all lower orders that the family nests, lowest first.
+    lower: Arc<Vec<[CellBasis; 3]>>,
     stride: usize,
 }
 
@@ -56,12 +59,16 @@ impl Forest {
     /// # Errors
     /// The family has no such order.
     pub fn new(family: CellFamily, order: usize) -> Result<Self, OrderError> {
-        let bases = [
-            CellBasis::new(CellShape::Interval, family, order)?,
-            CellBasis::new(CellShape::Square, family, order)?,
-            CellBasis::new(CellShape::Triangle, family, order)?,
-        ];
-        Ok(Forest { nodes: Vec::new(), roots: Vec::new(), bases, stride: order })
+        let bases = |order| -> Result<[CellBasis; 3], OrderError> {
+            Ok([
+                CellBasis::new(CellShape::Interval, family, order)?,
+                CellBasis::new(CellShape::Square, family, order)?,
+                CellBasis::new(CellShape::Triangle, family, order)?,
+            ])
+        };
+        let nested = if family == CellFamily::Multiwavelet { order } else { 1 };
+        let lower = (1..nested).map(bases).collect::<Result<_, _>>()?;
+        Ok(Forest { nodes: Vec::new(), roots: Vec::new(), bases: bases(order)?, lower: Arc::new(lower), stride: order })
     }
 
     /// Adds a root domain of the given shape and measure; roots are numbered in order.
@@ -140,11 +147,13 @@ impl Forest {
 
     /// Basis on cells of one shape.
     pub fn basis(&self, shape: CellShape) -> &CellBasis {
-        &self.bases[match shape {
-            CellShape::Interval => 0,
-            CellShape::Square => 1,
-            CellShape::Triangle => 2,
-        }]
+        &self.bases[place(shape)]
+    }
+
+    /// The part of the basis that makes up this order; all of it for flatlets, which are not nested, and for orders
+    /// above its own.
+    pub fn basis_of_order(&self, shape: CellShape, order: u8) -> &CellBasis {
+        self.lower.get(usize::from(order.max(1)) - 1).map_or(self.basis(shape), |bases| &bases[place(shape)])
     }
 
     /// Basis of a node.
@@ -165,5 +174,13 @@ impl Forest {
             (id, x) = (self.child(id, c), local);
         }
         (id, x)
+    }
+}
+
+fn place(shape: CellShape) -> usize {
+    match shape {
+        CellShape::Interval => 0,
+        CellShape::Square => 1,
+        CellShape::Triangle => 2,
     }
 }

@@ -2,10 +2,10 @@
 //!
 //! [`cell`] (a dyadic piece of a domain) -> [`forest`] (the tree of cells over each root domain) -> [`kernel`] (what is
 //! integrated) -> [`mod@couple`] (one block of the operator, with what its own test samples say of its error) ->
-//! [`links`] (all blocks) -> [`estimate`] (where the error is, seen by an oracle that knows the magnitudes at both
-//! ends) -> [`refine`] (ProjectKernel, second form: links replaced by links between children) -> [`transport`] (pull,
-//! gather, push). Beside them [`assembly`], the matrix that nothing compresses, and [`trees`], the passes one root at a
-//! time.
+//! [`links`] (all blocks) -> [`estimate`] (where the error is) -> [`oracle`] (what to refine, knowing the magnitudes at
+//! both ends) -> [`refine`] (ProjectKernel, second form: links replaced by links between children) -> [`transport`] (pull,
+//! gather, push). Beside them [`assembly`], the matrix that nothing compresses, [`standard`], its other decomposition (on
+//! a [`pyramid`]), and [`trees`], the passes one root at a time.
 //!
 //! The approximate operator is the congruence P^T M P: pull P takes finest coefficients to all levels, the links M join
 //! equal or unequal levels, push P^T brings the result down. The thesis splits both ends of a link; splitting one end
@@ -20,7 +20,10 @@ pub mod estimate;
 pub mod forest;
 pub mod kernel;
 pub mod links;
+pub mod oracle;
+pub mod pyramid;
 pub mod refine;
+pub mod standard;
 pub mod transport;
 pub mod trees;
 
@@ -31,5 +34,8 @@ pub use estimate::{Estimate, Magnitudes};
 pub use forest::{Forest, NodeId};
 pub use kernel::{Detail, Kernel, Masked, Pair};
 pub use links::{Link, Links};
-pub use refine::{End, Refinement, Task};
+pub use oracle::{Judgement, Oracle, Weight};
+pub use pyramid::Pyramid;
+pub use refine::{Change, End, Refinement, Task};
+pub use standard::{Standard, Terms};
 pub use trees::Trees;

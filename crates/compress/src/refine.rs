@@ -19,6 +19,24 @@ pub enum End {
     Shooter,
 }
 
+/// How to change a link.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Change {
+    /// It becomes links to the children of one end.
+    Split(End),
+    /// Its order at one end rises by one.
+    Raise(End),
+}
+
+impl Change {
+    /// The end that changes.
+    pub fn end(self) -> End {
+        match self {
+            Change::Split(end) | Change::Raise(end) => end,
+        }
+    }
+}
+
 /// One pair to couple: a node or a child of a node (which may not exist yet) at each end.
 #[derive(Clone, Copy, Debug)]
 pub struct Task {
@@ -50,23 +68,30 @@ impl Refinement {
         Refinement { tasks, done: 0, made: Vec::new(), removed: Vec::new() }
     }
 
-    /// A batch that splits the chosen links (by index) at the chosen ends.
-    pub fn splitting(
+    /// A batch that changes the chosen links (by index). The settings are those of the changed link, but for the order
+    /// that rises.
+    pub fn changing(
         forest: &Forest,
         links: &Links,
-        chosen: &[(u32, End)],
+        chosen: &[(u32, Change)],
         settings: impl Fn(u32) -> CoupleSettings,
     ) -> Self {
         let mut tasks = Vec::with_capacity(4 * chosen.len());
-        for &(k, end) in chosen {
+        for &(k, change) in chosen {
             let link = links.as_slice()[k as usize];
-            let settings = settings(k);
-            let split = match end {
-                End::Receiver => link.receiver,
-                End::Shooter => link.shooter,
+            let mut settings = settings(k);
+            let split = match change {
+                Change::Split(End::Receiver) => link.receiver,
+                Change::Split(End::Shooter) => link.shooter,
+                Change::Raise(end) => {
+                    let e = usize::from(end == End::Shooter);
+                    settings.orders[e] = link.orders[e] + 1;
+                    tasks.push(Task::between(link.receiver, link.shooter, settings));
+                    continue;
+                }
             };
             for c in 0..forest.node(split).cell.shape.arity() as u8 {
-                tasks.push(match end {
+                tasks.push(match change.end() {
                     End::Receiver => Task { receiver: (split, Some(c)), shooter: (link.shooter, None), settings },
                     End::Shooter => Task { receiver: (link.receiver, None), shooter: (split, Some(c)), settings },
                 });
@@ -106,8 +131,8 @@ impl Refinement {
         let (mut count, mut work) = (0, 0);
         while work < most && from + count < self.tasks.len() {
             let task = &self.tasks[from + count];
-            let order = forest.basis_of(task.receiver.0).order();
-            work += task.settings.work(order);
+            let shape = forest.node(task.receiver.0).cell.shape;
+            work += task.settings.work(forest.basis_of_order(shape, task.settings.orders[0]).order());
             count += 1;
         }
         let cell = |(id, child): (NodeId, Option<u8>)| -> Cell {
@@ -118,7 +143,9 @@ impl Refinement {
         let fresh = par::map(count, |i| {
             let task = tasks[from + i];
             let (r, s) = (cell(task.receiver), cell(task.shooter));
-            couple(kernel, &r, forest.basis(r.shape), &s, forest.basis(s.shape), task.settings)
+            let [p, q] = task.settings.orders;
+            let bases = [forest.basis_of_order(r.shape, p), forest.basis_of_order(s.shape, q)];
+            couple(kernel, &r, bases[0], &s, bases[1], task.settings)
         });
         let samples = fresh.iter().flatten().map(|c| u64::from(c.kernel_samples)).sum();
         let made = fresh.into_iter().enumerate().filter_map(|(i, c)| c.map(|c| ((from + i) as u32, c)));

@@ -9,7 +9,7 @@ fn smooth(x: f64, y: f64) -> f64 {
     1.0 / (1.5 + x - y)
 }
 
-const FULL: CoupleSettings = CoupleSettings { negligible: 0.0, samples: 0, thorough: false };
+const FULL: CoupleSettings = CoupleSettings::EXACT;
 
 /// Links between the leaves of uniform trees of the given depth: every pair coupled at the finest level.
 fn uniform<F: Fn(u32, [f64; 2], u32, [f64; 2]) -> f64 + Sync>(
@@ -50,7 +50,7 @@ fn layered<F: Fn(u32, [f64; 2], u32, [f64; 2]) -> f64 + Sync>(
     loop {
         while !batch.step(kernel, forest, 640).0 {}
         batch.commit(forest, &mut links);
-        let chosen: Vec<(u32, End)> = links
+        let chosen: Vec<(u32, Change)> = links
             .as_slice()
             .iter()
             .enumerate()
@@ -59,13 +59,13 @@ fn layered<F: Fn(u32, [f64; 2], u32, [f64; 2]) -> f64 + Sync>(
                 let depth = |id| forest.node(id).cell.depth;
                 let end = if depth(l.receiver) <= depth(l.shooter) { End::Receiver } else { End::Shooter };
                 let split = if end == End::Receiver { l.receiver } else { l.shooter };
-                (depth(split) < deepest).then_some((k as u32, end))
+                (depth(split) < deepest).then_some((k as u32, Change::Split(end)))
             })
             .collect();
         if chosen.is_empty() {
             return links;
         }
-        batch = Refinement::splitting(forest, &links, &chosen, |_| FULL);
+        batch = Refinement::changing(forest, &links, &chosen, |_| FULL);
     }
 }
 
@@ -228,7 +228,7 @@ fn a_batch_that_is_given_up_changes_nothing() {
     let mut first = Refinement::linking(vec![Task::between(root, root, FULL)]);
     while !first.step(&kernel, &forest, 80).0 {}
     first.commit(&mut forest, &mut links);
-    let mut second = Refinement::splitting(&forest, &links, &[(0, End::Receiver)], |_| FULL);
+    let mut second = Refinement::changing(&forest, &links, &[(0, Change::Split(End::Receiver))], |_| FULL);
     second.step(&kernel, &forest, 1);
     drop(second);
     assert_eq!((forest.len(), links.len()), (1, 1));

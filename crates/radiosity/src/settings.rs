@@ -4,7 +4,10 @@ mod links;
 mod method;
 
 pub use links::{LinkSettings, LinkSettingsError};
-pub use method::{Iteration, IterationError, Method, MethodError};
+pub use method::{
+    Decomposition, DecompositionError, Iteration, IterationError, Method, MethodError, Oracle, OracleError, Weight,
+    WeightError,
+};
 
 use ondelette_wavelet::cell::{CellBasis, CellFamily};
 use serde::{Deserialize, Serialize};
@@ -31,6 +34,9 @@ pub struct Basis {
 impl Basis {
     /// Constants.
     pub const HAAR: Basis = Basis { flatlet: false, order: 1 };
+
+    /// The highest of those that links choose from where each has its own order.
+    pub const HIGHEST_AUTO: Basis = Basis { flatlet: false, order: 4 };
 
     /// The default: bilinear multiwavelets.
     pub const M2: Basis = Basis { flatlet: false, order: 2 };
@@ -112,6 +118,11 @@ pub enum SettingsError {
 }
 
 impl Settings {
+    /// Whether all elements are of one size and all their pairs are coupled.
+    pub fn is_uniform(&self) -> bool {
+        self.method.is_full() || self.links.decomposition == Decomposition::Standard
+    }
+
     /// Checks the numbers, and that the choices go together.
     ///
     /// ```

@@ -30,6 +30,19 @@ pub struct Statistics {
     pub shots: u64,
     /// The full matrix that would have been next, had it not been too large.
     pub too_large: Option<MatrixTooLarge>,
+    /// What the standard decomposition kept.
+    pub terms: Option<Terms>,
+}
+
+/// How many terms a full matrix has, and how many are kept in either decomposition for the same guarantee.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Terms {
+    /// Of the full matrix.
+    pub full: u64,
+    /// Of the standard decomposition, on which the solution is solved.
+    pub standard: u64,
+    /// Of the non-standard decomposition.
+    pub nonstandard: u64,
 }
 
 /// Closer to an element's edge than this (in its local units) counts as on it.

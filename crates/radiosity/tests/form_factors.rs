@@ -93,7 +93,7 @@ fn couplings_of_figure_23_match_the_projected_answer_element_by_element() {
             cells = cells.iter().flat_map(|c| (0..4).map(move |k| c.child(k))).collect();
         }
         let emitter = Cell::root(1, CellShape::Square);
-        let settings = CoupleSettings { negligible: 0.0, samples: 0, thorough: false };
+        let settings = CoupleSettings::EXACT;
         for cell in cells {
             let coupling = couple(&kernel, &cell, &basis, &emitter, &basis, settings).unwrap();
             let at = cell.origin.map(|o| (o * n as f64).round() as usize);
@@ -124,7 +124,7 @@ fn galerkin_blocks_match_also_for_touching_patches() {
         let areas: Vec<f64> = kernel.sides().iter().map(|s| s.area).collect();
         let basis = CellBasis::new(CellShape::Square, CellFamily::Multiwavelet, m).unwrap();
         let (r, s) = (Cell::root(0, CellShape::Square), Cell::root(1, CellShape::Square));
-        let settings = CoupleSettings { negligible: 0.0, samples: 0, thorough: false };
+        let settings = CoupleSettings::EXACT;
         let coupling = couple(&kernel, &r, &basis, &s, &basis, settings).unwrap();
         let scale = (areas[0] / areas[1]).sqrt();
         for i in 0..m * m {

@@ -177,7 +177,7 @@ fn all_solvers_converge_to_the_same_light() {
 fn a_sweep_of_gauss_seidel_does_more_than_one_of_jacobi_and_krylov_more_than_both() {
     let scene = samples::cube(0.9, [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
     let sweeps = |iteration| {
-        let links = LinkSettings { iteration, subdivision: Some(2) };
+        let links = LinkSettings { iteration, subdivision: Some(2), ..LinkSettings::default() };
         let told = Settings { basis: "haar".parse().unwrap(), method: Method::Classical, error: 0.01, links };
         let mut solver = Solver::new(scene.clone(), told).unwrap();
         while solver.step().is_some() {}

@@ -8,7 +8,7 @@ use ondelette_io::Panel;
 use ondelette_io::write::{check_writable, elements_path};
 use ondelette_radiosity::scene::Paint;
 use ondelette_radiosity::settings::{LinkSettingsError, SettingsError};
-use ondelette_radiosity::{Basis, Iteration, LinkSettings, Method, Settings};
+use ondelette_radiosity::{Basis, Decomposition, Iteration, LinkSettings, Method, Oracle, Settings};
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -122,26 +122,50 @@ fn parsed<T: FromStr<Err: Display>>(flag: &str, value: &str) -> Result<T, Refusa
 /// What the solver is told.
 fn settings(args: &LightArgs) -> Result<Settings, Refusal> {
     let method: Method = parsed("--method", &args.method)?;
-    let linked = [("--solver", &args.solver), ("--subdivision", &args.subdivision)];
+    let linked = [
+        ("--solver", &args.solver),
+        ("--oracle", &args.oracle),
+        ("--weight", &args.weight),
+        ("--decomposition", &args.decomposition),
+        ("--subdivision", &args.subdivision),
+    ];
     if let Some((flag, _)) = linked.iter().find(|(_, value)| value.is_some() && !method.has_links()) {
         return Err(Refusal::new(format!(
             "{flag}: the method {method} has no links; it is for --method classical, galerkin, hierarchical or wavelet"
         )));
     }
+    let refining = [("--oracle", &args.oracle), ("--weight", &args.weight)];
+    if let Some((flag, _)) = refining.iter().find(|(_, value)| value.is_some() && method.is_full()) {
+        return Err(Refusal::new(format!("{flag}: {}", LinkSettingsError::NoOracle(method))));
+    }
+    if args.decomposition.is_some() && method.is_full() {
+        return Err(Refusal::new(format!("--decomposition: {}", LinkSettingsError::NotDecomposed(method))));
+    }
+    let graded = args.basis.as_deref() == Some("auto");
     let basis = match &args.basis {
+        Some(_) if graded => Basis::HIGHEST_AUTO,
         Some(name) => parsed("--basis", name)?,
         None if matches!(method, Method::Classical | Method::Hierarchical) => Basis::HAAR,
         None => Basis::M2,
     };
     let links = LinkSettings {
         iteration: args.solver.as_deref().map_or(Ok(Iteration::default()), |name| parsed("--solver", name))?,
+        oracle: args.oracle.as_deref().map_or(Ok(Oracle::default()), |name| parsed("--oracle", name))?,
+        weight: args.weight.as_deref().map(|name| parsed("--weight", name)).transpose()?,
+        graded,
+        decomposition: args
+            .decomposition
+            .as_deref()
+            .map_or(Ok(Decomposition::default()), |name| parsed("--decomposition", name))?,
         subdivision: args.subdivision.as_deref().map(subdivision).transpose()?,
     };
     let settings = Settings { basis, method, error: values::percent(&args.error)?, links };
     settings.validated().map_err(|e| {
         let flag = match &e {
             SettingsError::Error(_) => "--error",
-            SettingsError::Links(LinkSettingsError::Basis { .. }) => "--basis",
+            SettingsError::Links(LinkSettingsError::NotGraded(_) | LinkSettingsError::Basis { .. }) => "--basis",
+            SettingsError::Links(LinkSettingsError::NoVariation) => "--weight",
+            SettingsError::Links(LinkSettingsError::Standard(..)) => "--decomposition",
             SettingsError::Links(_) => "--subdivision",
         };
         Refusal::new(format!("{flag}: {e}"))

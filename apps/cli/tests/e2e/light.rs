@@ -72,6 +72,13 @@ fn the_report_names_method_and_solver_and_counts_their_work() {
         assert!(told["iterations"].as_u64().unwrap() > 0);
     }
     assert!(report("--error 5%")["settings"]["solver"].is_null());
+    let told = report("--error 5% --method wavelet --basis auto --oracle fit");
+    let said = |name: &str| told["settings"][name].as_str().map(str::to_owned);
+    assert_eq!(["basis", "oracle", "weight"].map(said), ["auto", "fit", "brightness"].map(|s| Some(s.into())));
+    let told = report("--error 10% --method wavelet --decomposition standard");
+    let terms = |name: &str| told["terms"][name].as_u64().unwrap();
+    assert!(terms("standard") < terms("full") && terms("nonstandard") < terms("full"), "{}", told["terms"]);
+    assert!(told["settings"]["oracle"].is_null() && told["settings"]["decomposition"] == "standard");
     // a subdivision that is too coarse is a result that misses its tolerance
     let ended = place.run("light room.obj --method classical --subdivision 1 --error 1% -o a.onl").with_code(1);
     assert!(ended.err.contains("subdivision of 1 is too coarse"), "{}", ended.err);
@@ -162,7 +169,17 @@ fn help_mentions_every_flag_and_ends_with_0() {
     };
     let light = help("light --help");
     let flags = ["-o", "--basis", "--error", "--max-time", "--threads", "--two-sided", "--camera", "--report"];
-    let links = ["--method", "--solver", "--subdivision", "gauss-seidel", "progressive", "galerkin"];
+    let links = [
+        "--method",
+        "--solver",
+        "--subdivision",
+        "--oracle",
+        "--weight",
+        "auto",
+        "gauss-seidel",
+        "progressive",
+        "galerkin",
+    ];
     let values =
         [".glb", ".png", ".exr", ".csv", ".onl", "out/NAME", "haar", "f1 to f4", "eye=x,y,z", "builtin:cornell"];
     for said in flags.into_iter().chain(values).chain(links) {

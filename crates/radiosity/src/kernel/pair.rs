@@ -95,7 +95,7 @@ impl Pair for LightPair<'_> {
                 let k = weight * density(from, n, self.shooter.point(y), self.shooter.normal);
                 whole += k;
                 actual += k * present.at(self.cell.root, self.cell.to_root(y));
-                projected += k * present.value(node, y);
+                projected += k * present.value(node, y, basis.order());
             }
             if whole > 0.0 {
                 detail.actual += piece.exact / whole * actual;
@@ -163,7 +163,7 @@ impl LightPair<'_> {
                 sum.add(weight, open, &values[..basis.len()]);
                 if open && let (Some(node), Some(present)) = (self.node, &self.kernel.present) {
                     sum.actual += weight * present.at(self.cell.root, self.cell.to_root(y));
-                    sum.projected += weight * present.value(node, y);
+                    sum.projected += weight * present.value(node, y, basis.order());
                 }
             }
             if sum.whole > 0.0 {

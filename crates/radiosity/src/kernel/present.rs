@@ -15,15 +15,16 @@ impl Present {
     /// Radiosity at root coordinates.
     pub(super) fn at(&self, root: u32, x: [f64; 2]) -> f64 {
         let (leaf, local) = self.forest.locate(root as usize, x);
-        self.value(leaf, local)
+        self.value(leaf, local, self.forest.basis_of(leaf).order())
     }
 
-    pub(super) fn value(&self, id: NodeId, local: [f64; 2]) -> f64 {
+    /// Value of what a node knows up to an order.
+    pub(super) fn value(&self, id: NodeId, local: [f64; 2], order: usize) -> f64 {
         let basis = self.forest.basis_of(id);
         let mut values = [0.0; MOST_FUNCTIONS];
         basis.eval(local, &mut values);
         let own = &self.values[id.index() * self.forest.stride()..][..basis.len()];
-        own.iter().zip(&values).map(|(c, v)| c[0] * v).sum()
+        basis.truncated(order).iter().map(|&j| own[usize::from(j)][0] * values[usize::from(j)]).sum()
     }
 
     /// The node of a cell, if it has detail below it.

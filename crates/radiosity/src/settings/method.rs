@@ -117,3 +117,43 @@ impl Iteration {
         matches!(self, Iteration::GaussSeidel | Iteration::Southwell | Iteration::Shooting)
     }
 }
+
+/// What decides which links are refined.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Oracle {
+    /// The form factor (Hanrahan, Salzman, Aupperle 1991): what exchanges most is refined first.
+    Magnitude,
+    /// How far a polynomial of the link's order misses the kernel (thesis 4.5.3).
+    Fit,
+    /// What refining a link takes off the estimated error of the scene.
+    #[default]
+    Error,
+}
+
+names!(Oracle, "oracle", OracleError, [(Magnitude, "magnitude"), (Fit, "fit"), (Error, "error")]);
+
+/// What an oracle's test of the kernel is weighted with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Weight {
+    /// Brightness refinement: the radiosity of the shooter.
+    Brightness,
+    /// Variation refinement, which the thesis describes and leaves open: how the kernel varies over the shooter is
+    /// weighted with how the shooter's radiosity does, beyond its basis.
+    Variation,
+    /// The kernel alone.
+    None,
+}
+
+names!(Weight, "weight", WeightError, [(Brightness, "brightness"), (Variation, "variation"), (None, "none")]);
+
+/// How an operator is written in wavelets.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Decomposition {
+    /// Links between nodes of any level (thesis 4.4.2): what an oracle refines.
+    #[default]
+    Nonstandard,
+    /// The full matrix transformed on both axes (thesis 4.4.1), small terms dropped.
+    Standard,
+}
+
+names!(Decomposition, "decomposition", DecompositionError, [(Nonstandard, "nonstandard"), (Standard, "standard")]);

@@ -2,7 +2,7 @@
 //!
 //! What the transport of an operator needs of a tree wavelet basis: the scaling functions of one cell and the two-scale
 //! matrices to its children (thesis 4.5.1). Splitting a cell into children and dropping detail is the second form of
-//! ProjectKernel (4.5.2), so wavelets themselves never appear here; the one-dimensional tree families have them.
+//! ProjectKernel (4.5.2), so wavelets appear only in [`CellBasis::detail`], for the standard decomposition.
 //!
 //! Heights are chosen so that a coefficient has the unit of the function: multiwavelets are orthonormal for the *mean*
 //! over the cell (the first function is 1), flatlet boxes have height 1. Then for both families, with the same matrices
@@ -15,6 +15,7 @@
 
 mod analysis;
 mod basis;
+mod detail;
 mod shape;
 #[cfg(test)]
 mod tests;

@@ -299,6 +299,6 @@ impl Linked {
         self.irradiance = result;
         self.statistics.iterations += 1;
         self.statistics.residual = residual;
-        self.judge()
+        if self.standard.is_some() { self.conclude() } else { self.judge() }
     }
 }

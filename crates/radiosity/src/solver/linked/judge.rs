@@ -3,12 +3,15 @@
 use super::guess::rays_for;
 use super::{DEEPEST, Event, Linked, Phase};
 use crate::rgb::Rgb;
-use ondelette_compress::{CoupleSettings, End, Estimate, Link, Magnitudes, Refinement, transport};
+use crate::settings::{Decomposition, Oracle, Weight};
+use ondelette_compress::{Change, CoupleSettings, End, Estimate, Judgement, Link, Magnitudes, Refinement, transport};
 
 /// Fewest rays of a receiver point in the last look at a masked pair.
 const LEAST_LAST_RAYS: usize = 32;
 /// Share of the promise aimed at, so that the last look at the links does not break it.
 const AIM: f64 = 0.97;
+/// One in so many links is refined at least in a round of an oracle that does not know the error.
+const LEAST_SHARE: usize = 16;
 /// Sweeps that follow a bias through the scene.
 const CARRIED_SWEEPS: usize = 4;
 
@@ -40,7 +43,7 @@ impl Linked {
     pub(super) fn judge(&mut self) -> Event {
         let mut values = self.radiosity(&self.irradiance, true);
         transport::pull(&self.forest, &mut values);
-        let magnitudes = Magnitudes::of(&self.forest, &values);
+        let magnitudes = Magnitudes::of(&self.forest, &values, self.is_graded());
         let estimate = Estimate::of(&self.forest, &self.links, &magnitudes, |root| self.counts(root));
         let mean = self.mean_irradiance();
         let whole = mean.sum() * self.counted_area;
@@ -60,10 +63,12 @@ impl Linked {
 
     /// After a balance of a full matrix: done, tighten the solve, or halve the elements.
     fn proceed_uniformly(&mut self) {
-        if self.error > self.settings.error {
+        let decomposes = self.settings.links.decomposition == Decomposition::Standard;
+        let enough = if decomposes { 1.0 - super::standard::SHARE } else { 1.0 };
+        if self.error > enough * self.settings.error {
             self.halve_elements();
         } else if self.strict {
-            self.phase = Phase::Finished;
+            self.phase = if decomposes { Phase::Decomposing } else { Phase::Finished };
         } else {
             self.strict = true;
             self.start_solving();
@@ -73,13 +78,17 @@ impl Linked {
     /// After a balance of adapting links: done, tighten the solve, look again at what is masked, or refine. `unit` is
     /// the mean irradiance, channels summed.
     fn proceed(&mut self, estimate: &Estimate<3>, magnitudes: &Magnitudes<3>, unit: f64) {
+        let graded = self.is_graded();
         let settings = |k: u32| {
             let link = self.links.as_slice()[k as usize];
             let shot: f64 = magnitudes.mean[link.shooter.index()].iter().sum();
             let share = f64::from(link.strength) * shot / unit;
             let samples = rays_for(share, self.settings.error, 4);
+            if graded {
+                return CoupleSettings { orders: link.orders, negligible: -1.0, samples, thorough: false };
+            }
             let negligible = if shot > 0.0 { 0.003 * self.settings.error * unit / shot } else { 0.0 };
-            CoupleSettings { negligible, samples, thorough: false }
+            CoupleSettings { negligible, samples, ..CoupleSettings::EXACT }
         };
         // the first time good enough, with a little to spare: renew; then tighten; then done
         let enough = if self.renewed { 1.0 } else { AIM };
@@ -106,24 +115,42 @@ impl Linked {
         }
         self.strict = false;
         self.renewed = false;
-        let target = self.settings.error * unit * self.counted_area;
-        let wanted = (estimate.total - 0.5 * target).min(0.6 * estimate.total).max(0.2 * estimate.total);
-        let may_split = |k: u32| {
-            let link = self.links.as_slice()[k as usize];
-            let id = if estimate.ends[k as usize] == End::Receiver { link.receiver } else { link.shooter };
-            self.forest.node(id).cell.depth < DEEPEST
-        };
-        let chosen: Vec<(u32, End)> = estimate
-            .largest(wanted, (self.links.len() / 2).max(64), may_split)
-            .into_iter()
-            .map(|k| (k, estimate.ends[k as usize]))
-            .collect();
+        let (oracle, weight) = (self.settings.links.oracle, self.settings.links.weight());
+        let judgement =
+            oracle.of_links().judge(weight.of_links(), graded, &self.forest, &self.links, magnitudes, estimate);
+        let chosen = self.choose(&judgement, estimate, self.settings.error * unit * self.counted_area);
         if chosen.is_empty() {
             self.stalled = true;
             self.phase = Phase::Finished;
             return;
         }
-        self.phase = Phase::Refining(Refinement::splitting(&self.forest, &self.links, &chosen, settings));
+        self.phase = Phase::Refining(Refinement::changing(&self.forest, &self.links, &chosen, settings));
+    }
+
+    /// The links to change: those that together address what is missing to the `target`, or by other oracles those
+    /// above a threshold that falls from round to round.
+    fn choose(&self, judgement: &Judgement, estimate: &Estimate<3>, target: f64) -> Vec<(u32, Change)> {
+        let may = |k: u32| {
+            let link = self.links.as_slice()[k as usize];
+            match judgement.changes[k as usize] {
+                Change::Split(End::Receiver) => self.forest.node(link.receiver).cell.depth < DEEPEST,
+                Change::Split(End::Shooter) => self.forest.node(link.shooter).cell.depth < DEEPEST,
+                Change::Raise(_) => true,
+            }
+        };
+        let most = (self.links.len() / 2).max(64);
+        let chosen = if self.settings.links.oracle == Oracle::Error {
+            let wanted = (estimate.total - 0.5 * target).min(0.6 * estimate.total).max(0.2 * estimate.total);
+            judgement.largest(wanted, most, may)
+        } else {
+            judgement.upper_half(self.links.len() / LEAST_SHARE, most, may)
+        };
+        chosen.into_iter().map(|k| (k, judgement.changes[k as usize])).collect()
+    }
+
+    /// Whether links have orders of their own.
+    fn is_graded(&self) -> bool {
+        self.settings.links.graded
     }
 
     /// Gives the kernel the radiosity as it stands.
@@ -139,7 +166,7 @@ impl Linked {
         let stakes: Vec<f64> = links
             .iter()
             .map(|l| {
-                let detail: f64 = magnitudes.detail[l.shooter.index()].iter().sum();
+                let detail: f64 = magnitudes.detail(l.shooter.index(), l.orders[1]).iter().sum();
                 self.forest.node(l.receiver).measure * f64::from(l.spread + l.roughness) * detail
             })
             .collect();
@@ -158,5 +185,25 @@ impl Linked {
         chosen.sort_unstable();
         chosen.dedup();
         chosen
+    }
+}
+
+impl Oracle {
+    fn of_links(self) -> ondelette_compress::Oracle {
+        match self {
+            Oracle::Magnitude => ondelette_compress::Oracle::Magnitude,
+            Oracle::Fit => ondelette_compress::Oracle::Fit,
+            Oracle::Error => ondelette_compress::Oracle::Error,
+        }
+    }
+}
+
+impl Weight {
+    fn of_links(self) -> ondelette_compress::Weight {
+        match self {
+            Weight::Brightness => ondelette_compress::Weight::Mean,
+            Weight::Variation => ondelette_compress::Weight::Detail,
+            Weight::None => ondelette_compress::Weight::Unit,
+        }
     }
 }

@@ -8,7 +8,10 @@ impl Linked {
     /// One reflection: what `values` at the leaves, as radiosity, bring to the leaves of `result`. Inner nodes of
     /// `values` are overwritten by their pulls.
     pub(super) fn transport(&self, values: &mut [[f64; 3]], result: &mut [[f64; 3]]) {
-        transport::apply(&self.forest, &self.links, values, result);
+        match &self.standard {
+            Some(standard) => standard.apply(&self.forest, values, result),
+            None => transport::apply(&self.forest, &self.links, values, result),
+        }
     }
 
     /// Exitance (if asked for) plus reflectance times irradiance at the leaves.

@@ -8,12 +8,13 @@
 //!
 //! The methods of thesis Fig. 15 share all of it but where links are: `hierarchical` and `wavelet` refine the links
 //! that an oracle points at ([`judge`]), `classical` and `galerkin` couple all elements of one size and halve that size
-//! ([`uniform`]). [`balance`] solves the linear system; [`measure`] integrates; [`guess`] says how many rays a pair gets.
+//! ([`uniform`]), and the standard decomposition compresses such a matrix ([`standard`]). [`balance`] solves the linear system; [`measure`] integrates; [`guess`] says how many rays a pair gets.
 
 mod balance;
 mod guess;
 mod judge;
 mod measure;
+mod standard;
 mod uniform;
 
 use super::{Event, SolveError};
@@ -23,7 +24,7 @@ use crate::settings::Settings;
 use crate::solution::{Solution, Statistics};
 use balance::Balance;
 use guess::Guess;
-use ondelette_compress::{Forest, Links, NodeId, Refinement, Task, transport};
+use ondelette_compress::{Forest, Links, NodeId, Refinement, Standard, Task, transport};
 use std::sync::Arc;
 pub use uniform::MatrixTooLarge;
 use uniform::{Uniform, Weaving};
@@ -33,6 +34,8 @@ enum Phase {
     /// Coupling all pairs of a full matrix.
     Weaving(Weaving),
     Solving(Balance),
+    /// A full matrix keeps the promise, and is to be decomposed.
+    Decomposing,
     Refining(Refinement),
     /// Coupling masked links anew with the radiosity that is known at last.
     Renewing(Refinement),
@@ -50,6 +53,8 @@ pub(super) struct Linked {
     phase: Phase,
     /// How fine a full matrix is; `None` where links adapt.
     uniform: Option<Uniform>,
+    /// The full matrix in its standard decomposition, once it is there: used in place of the links.
+    standard: Option<Standard>,
     /// Whether the present solve goes to the final tolerance.
     strict: bool,
     /// Area of the sides that the promise counts.
@@ -70,6 +75,8 @@ pub(super) const MOST_SIDES: usize = 6_000;
 const WORK_A_STEP: usize = 1024;
 /// Rays of a receiver point in the first, coarse linking.
 const COARSE_RAYS: usize = 16;
+/// Orders of the first links where each has its own.
+const FIRST_ORDERS: [u8; 2] = [3, 3];
 /// Deepest split.
 const DEEPEST: u32 = 16;
 
@@ -100,6 +107,7 @@ impl Linked {
             irradiance,
             phase: Phase::Finished,
             uniform: None,
+            standard: None,
             strict: false,
             counted_area,
             whole: 0.0,
@@ -108,7 +116,7 @@ impl Linked {
             error: f64::INFINITY,
             statistics: Statistics::default(),
         };
-        if settings.method.is_full() {
+        if settings.is_uniform() {
             engine.start_weaving(settings.links.subdivision.map(u32::from))?;
         } else {
             engine.phase = Phase::Linking(Refinement::linking(engine.pairs_of_sides()));
@@ -123,7 +131,11 @@ impl Linked {
         for (r, &receiver) in self.forest.roots().iter().enumerate() {
             for (s, &shooter) in self.forest.roots().iter().enumerate() {
                 if self.kernel.may_see(r, s) {
-                    tasks.push(Task::between(receiver, shooter, guess.settings(&self.scene, &self.kernel, r, s)));
+                    let mut settings = guess.settings(&self.scene, &self.kernel, r, s);
+                    if self.settings.links.graded {
+                        (settings.orders, settings.negligible) = (FIRST_ORDERS, -1.0);
+                    }
+                    tasks.push(Task::between(receiver, shooter, settings));
                 }
             }
         }
@@ -150,6 +162,7 @@ impl Linked {
             }
             Phase::Weaving(weaving) => Some(self.weave(weaving)),
             Phase::Solving(balance) => Some(self.iterate(balance)),
+            Phase::Decomposing => Some(self.decompose()),
             Phase::Finished => None,
         }
     }

@@ -2,9 +2,9 @@
 
 use super::guess::{Elements, Guess};
 use super::{Event, Linked, Phase, WORK_A_STEP};
-use crate::settings::LinkSettings;
+use crate::settings::{Decomposition, LinkSettings};
 use crate::solver::SolveError;
-use ondelette_compress::{Assembly, Magnitudes, transport};
+use ondelette_compress::{Assembly, Magnitudes, Standard, transport};
 use ondelette_wavelet::cell::CellShape;
 use serde::{Deserialize, Serialize};
 
@@ -93,7 +93,11 @@ impl Linked {
             pairs += count;
             numbers += count * (functions[k / n] * functions[k % n]) as f64;
         }
-        let bytes = pairs * Assembly::bytes_of_pair(0, 0) as f64 + 8.0 * numbers;
+        let mut bytes = pairs * Assembly::bytes_of_pair(0, 0) as f64 + 8.0 * numbers;
+        if self.settings.links.decomposition == Decomposition::Standard {
+            let rows: f64 = (0..n).map(|side| elements(side) * functions[side] as f64).sum();
+            bytes += Standard::bytes_of_term() as f64 * rows * rows;
+        }
         if bytes > MOST_BYTES as f64 {
             let elements = (0..n).map(elements).sum::<f64>() as u64;
             return Err(MatrixTooLarge { elements, bytes: bytes as u64, most: MOST_BYTES });
@@ -140,7 +144,7 @@ impl Linked {
             }
         }
         transport::pull(&self.forest, &mut values);
-        let magnitudes = Magnitudes::of(&self.forest, &values);
+        let magnitudes = Magnitudes::of(&self.forest, &values, false);
         magnitudes.mean.iter().map(|m| m.iter().sum::<f64>().abs() / irradiance).collect()
     }
 
