@@ -85,8 +85,8 @@ pub(crate) struct LightArgs {
     pub(crate) outputs: Vec<PathBuf>,
 
     /// Functions that light is represented in: haar, m1 to m6 (multiwavelets), f1 to f4 (flatlets); with --method
-    /// wavelet also auto (an order for each link, m1 to m4, by what it promises for the work) [default: m2; haar for the
-    /// methods classical and hierarchical, which have no other]
+    /// wavelet also auto (an order for each link, m1 to m4, by what it promises for the work) [default: m2; haar for
+    /// the methods classical and hierarchical, which have no other]
     #[arg(long, value_name = "NAME", allow_hyphen_values = true)]
     pub(crate) basis: Option<String>,
 
@@ -108,8 +108,8 @@ pub(crate) struct LightArgs {
     #[arg(long, value_name = "NAME", allow_hyphen_values = true)]
     pub(crate) oracle: Option<String>,
 
-    /// Hierarchical and wavelet: what the oracle's test is weighted with: brightness (of the shooter), variation (of the
-    /// shooter's radiosity beyond its basis), none [default: variation for the oracle error, brightness for the others]
+    /// Hierarchical and wavelet: what the oracle's test is weighted with: brightness (of the shooter), variation (of
+    /// the shooter's radiosity beyond its basis), none [default: variation for the oracle error, brightness for the others]
     #[arg(long, value_name = "NAME", allow_hyphen_values = true)]
     pub(crate) weight: Option<String>,
 
@@ -119,8 +119,8 @@ pub(crate) struct LightArgs {
     #[arg(long, value_name = "NAME", allow_hyphen_values = true)]
     pub(crate) decomposition: Option<String>,
 
-    /// Classical, galerkin and the standard decomposition: divide the longest edge of the scene into 2^N parts, shorter edges into parts no longer
-    /// than these [default: halved until the error is small enough]
+    /// Classical, galerkin and the standard decomposition: divide the longest edge of the scene into 2^N parts, shorter
+    /// edges into parts no longer than these [default: halved until the error is small enough]
     #[arg(long, value_name = "N", allow_hyphen_values = true)]
     pub(crate) subdivision: Option<String>,
 

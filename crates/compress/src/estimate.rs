@@ -22,8 +22,8 @@ pub struct Magnitudes<const C: usize> {
 }
 
 impl<const C: usize> Magnitudes<C> {
-    /// Of pulled values (see [`crate::transport::pull`]). With `graded`, links have orders of their own, and what a lower
-    /// order leaves out is detail too; else what links were coupled without does not matter.
+    /// Of pulled values (see [`crate::transport::pull`]). With `graded`, links have orders of their own, and what a
+    /// lower order leaves out is detail too; else what links were coupled without does not matter.
     pub fn of(forest: &Forest, values: &[[f64; C]], graded: bool) -> Self {
         let stride = forest.stride();
         let orders = forest.basis(CellShape::Square).order();

@@ -3,9 +3,9 @@
 //! [`cell`] (a dyadic piece of a domain) -> [`forest`] (the tree of cells over each root domain) -> [`kernel`] (what is
 //! integrated) -> [`mod@couple`] (one block of the operator, with what its own test samples say of its error) ->
 //! [`links`] (all blocks) -> [`estimate`] (where the error is) -> [`oracle`] (what to refine, knowing the magnitudes at
-//! both ends) -> [`refine`] (ProjectKernel, second form: links replaced by links between children) -> [`transport`] (pull,
-//! gather, push). Beside them [`assembly`], the matrix that nothing compresses, [`standard`], its other decomposition (on
-//! a [`pyramid`]), and [`trees`], the passes one root at a time.
+//! both ends) -> [`refine`] (ProjectKernel, second form: links replaced by links between children) ->
+//! [`transport`] (pull, gather, push). Beside them [`assembly`], the matrix that nothing compresses, [`standard`], its
+//! other decomposition (on a [`pyramid`]), and [`trees`], the passes one root at a time.
 //!
 //! The approximate operator is the congruence P^T M P: pull P takes finest coefficients to all levels, the links M join
 //! equal or unequal levels, push P^T brings the result down. The thesis splits both ends of a link; splitting one end

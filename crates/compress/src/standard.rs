@@ -3,7 +3,8 @@
 //! of the same matrix would keep.
 //!
 //! Both bases of functions of two variables are orthonormal, so that the squares of dropped terms add up to the square
-//! of the Hilbert-Schmidt norm of the change, and the same budget means the same guarantee: ||change B|| <= budget ||B||.
+//! of the Hilbert-Schmidt norm of the change, and the same budget means the same guarantee: the change of K times B has
+//! at most budget times the norm of B.
 
 use crate::forest::{Forest, NodeId};
 use crate::links::Links;

@@ -5,14 +5,14 @@ use super::shape::CellShape;
 use crate::tree::TreeFamily;
 
 impl CellBasis {
-    /// The wavelets of a cell in the functions of its children, `(arity - 1) n x arity n`, row-major; column `c n + j` is
-    /// function `j` of child `c`. Orthonormal among themselves and to the scaling functions, in coefficients multiplied
+    /// The wavelets of a cell in the functions of its children, `(arity - 1) n x arity n`, row-major; column `c n + j`
+    /// is function `j` of child `c`. Orthonormal among themselves and to the scaling functions, in coefficients multiplied
     /// by the root of the measure of their cell, for which the scaling functions have the rows `T_c / sqrt(arity)`.
     /// `None` for flatlets, which are not orthogonal.
     ///
     /// Intervals: the multiwavelets psi^1 .. psi^M. Squares: products of these and the scaling functions, but for those
-    /// of scaling functions alone. Triangles: unit vectors made orthonormal to all before (Gram and Schmidt, the one that
-    /// keeps most of its length first). Cost O((arity n)^3).
+    /// of scaling functions alone. Triangles: unit vectors made orthonormal to all before (Gram and Schmidt, the one
+    /// that keeps most of its length first). Cost O((arity n)^3).
     ///
     /// ```
     /// use ondelette_wavelet::cell::{CellBasis, CellFamily, CellShape};

@@ -8,7 +8,8 @@
 //!
 //! The methods of thesis Fig. 15 share all of it but where links are: `hierarchical` and `wavelet` refine the links
 //! that an oracle points at ([`judge`]), `classical` and `galerkin` couple all elements of one size and halve that size
-//! ([`uniform`]), and the standard decomposition compresses such a matrix ([`standard`]). [`balance`] solves the linear system; [`measure`] integrates; [`guess`] says how many rays a pair gets.
+//! ([`uniform`]), and the standard decomposition compresses such a matrix ([`standard`]). [`balance`] solves the linear
+//! system; [`measure`] integrates; [`guess`] says how many rays a pair gets.
 
 mod balance;
 mod guess;

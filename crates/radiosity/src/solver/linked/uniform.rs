@@ -14,8 +14,8 @@ pub(super) const MOST_BYTES: u64 = 2_000_000_000;
 /// A full matrix that is too large to be stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 #[error(
-    "the full matrix of {elements} elements takes {:.1} GB, and {:.1} GB are allowed: the methods hierarchical, wavelet \
-     and sampled do not store it",
+    "the full matrix of {elements} elements takes {:.1} GB, and {:.1} GB are allowed: the methods hierarchical, \
+     wavelet and sampled do not store it",
     *.bytes as f64 / 1e9,
     *.most as f64 / 1e9
 )]
