@@ -109,7 +109,8 @@ pub(crate) struct LightArgs {
     pub(crate) oracle: Option<String>,
 
     /// Hierarchical and wavelet: what the oracle's test is weighted with: brightness (of the shooter), variation (of
-    /// the shooter's radiosity beyond its basis), none [default: variation for the oracle error, brightness for the others]
+    /// the shooter's radiosity beyond its basis), none [default: variation for the oracle error, brightness for the
+    /// others]
     #[arg(long, value_name = "NAME", allow_hyphen_values = true)]
     pub(crate) weight: Option<String>,
 

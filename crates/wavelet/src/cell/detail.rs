@@ -6,8 +6,9 @@ use crate::tree::TreeFamily;
 
 impl CellBasis {
     /// The wavelets of a cell in the functions of its children, `(arity - 1) n x arity n`, row-major; column `c n + j`
-    /// is function `j` of child `c`. Orthonormal among themselves and to the scaling functions, in coefficients multiplied
-    /// by the root of the measure of their cell, for which the scaling functions have the rows `T_c / sqrt(arity)`.
+    /// is function `j` of child `c`. Orthonormal among themselves and to the scaling functions, in coefficients
+    /// multiplied by the root of the measure of their cell, for which the scaling functions have the rows
+    /// `T_c / sqrt(arity)`.
     /// `None` for flatlets, which are not orthogonal.
     ///
     /// Intervals: the multiwavelets psi^1 .. psi^M. Squares: products of these and the scaling functions, but for those
