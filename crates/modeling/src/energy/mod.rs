@@ -10,7 +10,8 @@ mod operator;
 mod stencil;
 pub(crate) mod twofold;
 
-pub(crate) use operator::{Operator, Scratch};
+pub(crate) use cell::{CellMatrix, Classes, SpanClass};
+pub(crate) use operator::{Hessian, Operator, Scratch};
 
 use crate::system::Space;
 use serde::{Deserialize, Serialize};

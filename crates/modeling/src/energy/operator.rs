@@ -40,6 +40,39 @@ pub(crate) struct Scratch {
     c: Vec<f64>,
 }
 
+impl Scratch {
+    /// Two buffers of the given length, contents undefined.
+    pub(crate) fn pair(&mut self, n: usize) -> (&mut [f64], &mut [f64]) {
+        (sized(&mut self.a, n), sized(&mut self.b, n))
+    }
+}
+
+/// A symmetric positive semi-definite matrix of one coordinate, applied without being formed.
+pub(crate) trait Hessian {
+    /// `y = H x`.
+    fn times(&self, x: &[f64], y: &mut [f64], scratch: &mut Scratch);
+
+    /// The sum of its diagonal.
+    fn trace(&self) -> f64;
+
+    /// True for energies of surfaces.
+    fn is_surface(&self) -> bool;
+}
+
+impl Hessian for Operator {
+    fn times(&self, x: &[f64], y: &mut [f64], scratch: &mut Scratch) {
+        self.apply(x, y, scratch);
+    }
+
+    fn trace(&self) -> f64 {
+        self.diagonal().iter().sum()
+    }
+
+    fn is_surface(&self) -> bool {
+        self.lines.len() == 2
+    }
+}
+
 fn sized(v: &mut Vec<f64>, n: usize) -> &mut [f64] {
     v.resize(n, 0.0);
     &mut v[..n]

@@ -12,6 +12,7 @@ mod cosine;
 mod green;
 mod method;
 pub(crate) mod multigrid;
+mod oracle;
 mod projected;
 mod refine;
 mod solution;
@@ -22,5 +23,6 @@ mod transfer;
 mod wavelet;
 
 pub use method::{Method, MethodError, Settings};
+pub use oracle::{Oracle, Round};
 pub use refine::{SolveError, Solver, Step};
 pub use solution::{Residual, Solution};

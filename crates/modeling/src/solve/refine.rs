@@ -14,7 +14,7 @@ use super::thesis::Squared;
 use super::wavelet::WaveletGreen;
 use crate::constraint::curvature;
 use crate::energy::{Operator, Scratch, twofold};
-use crate::system::{Block, Problem, ProblemError, Structure};
+use crate::system::{Block, Problem, ProblemError, Redundant, Structure};
 use ondelette_wavelet::Boundary;
 use std::sync::Arc;
 
@@ -127,14 +127,7 @@ impl Solver {
         let (blocks, redundant) = problem.blocks(rows)?;
         let h = Arc::new(Operator::new(problem.space(), problem.energy(), problem.stiffness()));
         let (method, why) = choose(&problem, &h, settings.method)?;
-        let name = |c: &usize| problem.constraints()[*c].id.clone();
-        let notes = redundant
-            .iter()
-            .map(|r| {
-                let others: Vec<String> = r.others.iter().take(8).map(name).collect();
-                format!("constraint {} follows from {}: redundant", name(&r.constraint), others.join(", "))
-            })
-            .collect();
+        let notes = notes(&problem, &redundant);
         let sides = fresh_sides(&blocks);
         let blocks: Vec<(Arc<Structure>, Block)> =
             blocks.into_iter().map(|b| (Arc::new(b.structure.clone()), b)).collect();
@@ -481,15 +474,7 @@ impl Solver {
     pub fn solution(&self) -> Solution {
         let problem = &self.problem;
         let coefficients = self.coefficients();
-        let mut residuals: Vec<Residual> = problem
-            .rows()
-            .iter()
-            .map(|row| {
-                let value: f64 = row.entries().map(|(c, i, v)| v * coefficients[c][i]).sum();
-                let id = problem.constraints()[row.constraint].id.clone();
-                Residual { id, soft: row.give > 0.0, miss: (value - row.target) * row.length }
-            })
-            .collect();
+        let mut residuals = Residual::all(problem, &problem.rows(), &coefficients);
         residuals.extend(curvature::rows(problem, &coefficients).misses);
         Solution::new(
             problem.space().clone(),
@@ -502,6 +487,16 @@ impl Solver {
             self.notes.clone(),
         )
     }
+}
+
+/// What is said of redundant rows.
+pub(crate) fn notes(problem: &Problem, redundant: &[Redundant]) -> Vec<String> {
+    let name = |c: &usize| problem.constraints()[*c].id.clone();
+    let of = |r: &Redundant| {
+        let others: Vec<String> = r.others.iter().take(8).map(name).collect();
+        format!("constraint {} follows from {}: redundant", name(&r.constraint), others.join(", "))
+    };
+    redundant.iter().map(of).collect()
 }
 
 fn fresh_sides(blocks: &[Block]) -> Vec<Vec<SideState>> {
