@@ -355,6 +355,41 @@ impl Operator {
         }
     }
 
+    /// The entries between some coefficients, each unordered pair once or in parts: `position` says what a coefficient
+    /// is called, if it belongs to them.
+    pub(crate) fn among(
+        &self,
+        some: &[u32],
+        position: &dyn Fn(usize) -> Option<usize>,
+        put: &mut dyn FnMut(usize, usize, f64),
+    ) {
+        let (Kind::Uniform, [s, t]) = (&self.kind, &self.lines[..]) else {
+            self.entries(|r, c, v| {
+                if let (Some(r), Some(c)) = (position(r), position(c)) {
+                    put(r, c, v);
+                }
+            });
+            return;
+        };
+        let width = self.shape[1];
+        for &(p, q, c) in &self.terms {
+            let (rows, columns) = (s.energy[p].to_rows(), t.energy[q].to_rows());
+            for i in some.iter().map(|i| *i as usize) {
+                let Some(r) = position(i) else { continue };
+                for &(k, a) in &rows[i / width] {
+                    for &(l, b) in &columns[i % width] {
+                        let j = k * width + l;
+                        if j <= i
+                            && let Some(column) = position(j)
+                        {
+                            put(r, column, c * a * b);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
     /// The diagonal of H.
     pub(crate) fn diagonal(&self) -> Vec<f64> {
         let mut out = vec![0.0; self.len()];

@@ -9,6 +9,7 @@ mod bpx;
 pub(crate) mod cholesky;
 mod correct;
 mod cosine;
+mod edges;
 mod green;
 mod method;
 pub(crate) mod multigrid;

@@ -28,6 +28,8 @@ pub(crate) struct Part {
 #[derive(Clone, Debug)]
 pub(crate) struct Target {
     pub(crate) coordinates: Vec<usize>,
+    /// Constraint of each row.
+    pub(crate) constraints: Vec<usize>,
     pub(crate) targets: Vec<f64>,
     /// Coordinate by coordinate, functions in order.
     pub(crate) x: Vec<f64>,
@@ -93,6 +95,7 @@ impl Active {
                 let seen = b.structure.functionals.iter().map(|f| Seen::new(&hierarchy, f)).collect();
                 let sides = b.sides.into_iter().map(|s| Target {
                     coordinates: s.coordinates,
+                    constraints: s.constraints,
                     targets: s.targets,
                     x: vec![0.0; functions.len() * b.structure.k],
                     multipliers: vec![0.0; b.structure.rows()],
@@ -169,7 +172,7 @@ impl Active {
     /// Iterates on the active functions until the squared residual is below `goal`, `most` iterations a side at most.
     ///
     /// # Errors
-    /// The row without a pivot.
+    /// The constraint whose row has no pivot.
     pub(crate) fn solve(&mut self, goal: f64, most: usize) -> Result<Solved, usize> {
         let n = self.functions.len();
         let cover = Arc::new(Cover::new(&self.hierarchy, &self.functions, &mut self.marks));
@@ -206,7 +209,8 @@ impl Active {
             let s: Vec<f64> =
                 (0..kept.len()).flat_map(|i| (0..=i).map(move |j| (i, j))).map(|(i, j)| at(i, j)).collect();
             let y = y.iter().map(|y| kept.iter().map(|r| y[*r]).collect()).collect();
-            let border = Border::new(s, kept.len(), y).map_err(|row| kept[row])?;
+            let border = Border::new(s, kept.len(), y)
+                .map_err(|row| part.sides.first().map_or(0, |s| s.constraints[kept[row]]))?;
             let structure = Arc::new(all.over(n, &green.lists, &kept));
             let mut solver = Projected::bordered(
                 cover.clone(),

@@ -194,14 +194,12 @@ impl Oracle {
     fn solve(&mut self, share: f64) -> Result<(), SolveError> {
         let goal = share * self.bound * self.last.energy;
         let goal = if goal > 0.0 && goal.is_finite() { goal } else { f64::MIN_POSITIVE };
-        self.last = self.active.solve(goal, ITERATIONS).map_err(|row| self.degenerate(row))?;
+        self.last = self.active.solve(goal, ITERATIONS).map_err(|constraint| self.degenerate(constraint))?;
         Ok(())
     }
 
-    fn degenerate(&self, row: usize) -> SolveError {
-        let rows = self.problem.rows();
-        let id = rows.get(row).map_or("", |r| &self.problem.constraints()[r.constraint].id);
-        SolveError::Degenerate { id: id.to_owned() }
+    fn degenerate(&self, constraint: usize) -> SolveError {
+        SolveError::Degenerate { id: self.problem.constraints()[constraint].id.clone() }
     }
 
     /// A round of growth: solve, put to sleep, wake.
