@@ -26,7 +26,7 @@ mod thesis;
 mod transfer;
 mod wavelet;
 
-pub use method::{Method, MethodError, Settings};
+pub use method::{Iteration, Method, MethodError, Settings};
 pub use oracle::{Oracle, Round};
 pub use refine::{SolveError, Solver, Step};
 pub use solution::{Residual, Solution};

@@ -357,8 +357,9 @@ impl Solver {
                     .map(|basis| basis.ok_or_else(|| unfit("the axes have no common pyramid")))
                     .transpose()?;
                 let tolerance = self.settings.tolerance * 1e-3;
-                let steepest = self.settings.steepest;
-                return Ok(Box::new(Squared::new(self.h.clone(), structure, basis, steepest, tolerance, most)));
+                let (iteration, explicit) = (self.settings.iteration, self.settings.explicit);
+                let solver = Squared::new(self.h.clone(), structure, basis, (iteration, explicit), tolerance, most);
+                return Ok(Box::new(solver.ok_or_else(|| unfit("explicit matrices are for up to 5000 unknowns"))?));
             }
             Method::Wavelet => {
                 let green = WaveletGreen::new(space, energy, &self.h, self.settings.scaling);
