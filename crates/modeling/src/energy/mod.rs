@@ -5,13 +5,16 @@
 //! (`cell`) where the stiffness varies.
 
 mod cell;
+mod entries;
+mod hessian;
 mod line;
 mod operator;
 mod stencil;
 pub(crate) mod twofold;
 
 pub(crate) use cell::{CellMatrix, Classes, SpanClass};
-pub(crate) use operator::{Hessian, Operator, Scratch};
+pub(crate) use hessian::Hessian;
+pub(crate) use operator::{Operator, Scratch};
 
 use crate::system::Space;
 use serde::{Deserialize, Serialize};

@@ -64,7 +64,8 @@ pub struct Step {
 /// use ondelette_modeling::solve::{Settings, Solver};
 /// use ondelette_modeling::system::{Problem, Space};
 /// use ondelette_modeling::Axis;
-/// /// let axis = Axis::new(Boundary::Open, 16, [0.0, 1.0])?;
+/// use ondelette_wavelet::Boundary;
+/// let axis = Axis::new(Boundary::Open, 16, [0.0, 1.0])?;
 /// let point = |t: f64, y: f64| Constraint::new(format!("at {t}"), &[t], Demand::Position(vec![Some(y)]));
 /// let points = vec![point(0.0, 0.0), point(0.5, 1.0), point(1.0, 0.0)];
 /// let problem = Problem::new(Space::curve(axis), 1, Energy::BEND, None, points)?;

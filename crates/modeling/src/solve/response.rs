@@ -41,7 +41,7 @@ impl Solver {
 
     /// The Green column of a row: how the coefficients answer to one unit of its target, coordinate by coordinate.
     ///
-    /// Rows are numbered as in [`Solution::residuals`], redundant ones left out by name. Costs one solution with the
+    /// Rows are numbered as in [`super::Solution::residuals`], redundant ones left out by name. Costs one solution with the
     /// factors at hand. `None` for redundant rows and for curvature.
     ///
     /// # Errors

@@ -225,6 +225,7 @@ impl Active {
                 let mut multipliers: Vec<f64> = kept.iter().map(|r| side.multipliers[*r]).collect();
                 // Crowded rows may need more than one correction to be met in full.
                 let size = side.targets.iter().fold(0.0, |m: f64, b| m.max(b.abs()));
+                let before = side.x.clone();
                 for correction in 0..CORRECTIONS {
                     let miss = |(i, r): (usize, &usize)| {
                         side.targets[*r] - structure.apply_row(i, &side.x) + structure.give[i] * multipliers[i]
@@ -246,6 +247,19 @@ impl Active {
                     let (dx, dl) = solver.correction();
                     side.x.iter_mut().zip(dx).for_each(|(x, d)| *x += d);
                     multipliers.iter_mut().zip(dl).for_each(|(l, d)| *l += d);
+                }
+                // Rows that rounding cannot tell from others leave nothing to go by: back, and they wait like the rest.
+                let unclear = |(i, r): &(usize, &usize)| {
+                    let miss = side.targets[**r] - structure.apply_row(*i, &side.x);
+                    all.give[**r] == 0.0 && (miss.is_nan() || miss.abs() > 1e-8 * size)
+                };
+                let unclear: Vec<usize> = kept.iter().enumerate().filter(unclear).map(|(_, r)| *r).collect();
+                if !unclear.is_empty() {
+                    side.x = before;
+                    multipliers.fill(0.0);
+                    part.left_out.extend(unclear);
+                    part.left_out.sort_unstable();
+                    part.left_out.dedup();
                 }
                 side.multipliers.fill(0.0);
                 kept.iter().zip(&multipliers).for_each(|(r, l)| side.multipliers[*r] = *l);
