@@ -105,7 +105,8 @@ def peers(ours):
 
     print(f"{'case':26}{'ours':>10}{'CHOLMOD':>10}{'warm':>10}{'values':>10}{'RBF':>10}  ratios to ours")
     cases = [("mirrored", 64, 64, "cold-refined", 5), ("mirrored", 256, 256, "cold-refined", 3),
-             ("mirrored", 512, 1024, "cold-refined", 1), ("open", 64, 64, "bpx-1e-8", 5), ("open", 256, 256, "bpx-1e-8", 3)]
+             ("mirrored", 512, 1024, "cold-refined", 1), ("open", 64, 64, "bpx-1e-8", 5),
+             ("open", 256, 256, "bpx-1e-8", 3)]
     for boundary, n, m, name, runs in cases:
         h, a, b, p = problem(boundary, n, m)
         rho = 1e3 * h.diagonal().max()

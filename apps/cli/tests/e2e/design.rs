@@ -47,7 +47,8 @@ fn the_natural_spline_comes_out_of_a_specification() {
 fn an_adaptive_surface_says_how_few_wavelets_hold_it() {
     let place = Place::new();
     let spec = r#"{ "boundary": "mirror", "levels": 5, ADAPTIVE "constraints": [
-        { "id": "a", "at": [0, 0], "position": 1 }, { "id": "b", "at": [0.5, 0.5], "position": 0 }, { "id": "c", "at": [1, 0.3], "position": -1 } ] }"#;
+        { "id": "a", "at": [0, 0], "position": 1 },
+        { "id": "b", "at": [0.5, 0.5], "position": 0 }, { "id": "c", "at": [1, 0.3], "position": -1 } ] }"#;
     place.write("few.json", &spec.replace("ADAPTIVE", "\"adaptive\": true,"));
     place.write("all.json", &spec.replace("ADAPTIVE", ""));
     let ended = place.run("surface few.json -o few.npy --report few-r.json").with_code(0);

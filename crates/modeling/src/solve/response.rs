@@ -41,8 +41,8 @@ impl Solver {
 
     /// The Green column of a row: how the coefficients answer to one unit of its target, coordinate by coordinate.
     ///
-    /// Rows are numbered as in [`super::Solution::residuals`], redundant ones left out by name. Costs one solution with the
-    /// factors at hand. `None` for redundant rows and for curvature.
+    /// Rows are numbered as in [`super::Solution::residuals`], redundant ones left out by name. Costs one solution with
+    /// the factors at hand. `None` for redundant rows and for curvature.
     ///
     /// # Errors
     /// [`SolveError::Degenerate`].

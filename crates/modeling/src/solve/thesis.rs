@@ -1,6 +1,6 @@
 //! The iterations of the thesis (7.2.1, 7.3, 7.4.1): conjugate gradients, steepest descent or Gauss-Seidel on the
-//! squared saddle system M^T M, in B-splines or in wavelets. Implicit: M is applied by transforms and stencils; explicit: its
-//! entries are formed. For comparison; the square of M is what makes it slow.
+//! squared saddle system M^T M, in B-splines or in wavelets. Implicit: M is applied by transforms and stencils;
+//! explicit: its entries are formed. For comparison; the square of M is what makes it slow.
 
 use super::cholesky::dot;
 use super::correct::Correct;
