@@ -4,7 +4,7 @@
 //! [`shape`]: curves and surfaces, what they mean as geometry; [`edit`]: handles on every level; [`free`]: splines of
 //! other programs.
 //! [`energy`], [`constraint`]s and a [`system::Problem`] go to a [`solve::Solver`], which finds the smoothest shape;
-//! [`drag::Handles`] moves it, [`fit`] smooths data.
+//! [`drag::Handles`] moves it, [`fit`] smooths data; [`intrinsic`] curves depend on no parameter.
 
 pub mod axis;
 pub mod basis;
@@ -14,6 +14,7 @@ pub mod edit;
 pub mod energy;
 pub mod fit;
 pub mod free;
+pub mod intrinsic;
 pub mod shape;
 pub mod solve;
 pub mod system;

@@ -168,6 +168,30 @@ fn open_energies_reproduce_the_polynomials_they_do_not_see() {
 }
 
 #[test]
+fn every_bicubic_is_reproduced_by_interpolation() {
+    // As many values as coefficients, none smoothed: the fit of zero weight.
+    let (s, t) =
+        (Axis::new(Boundary::Open, 6, [-1.0, 3.0]).unwrap(), Axis::new(Boundary::Open, 4, [0.0, 1.0]).unwrap());
+    // Means of three neighbouring knots: one place a function.
+    let places = |a: &Axis| -> Vec<f64> {
+        let knot = |i: usize| (i as f64 - 2.0).clamp(0.0, a.spans() as f64);
+        (0..a.len()).map(|j| a.from_knots((knot(j) + knot(j + 1) + knot(j + 2)) / 3.0)).collect()
+    };
+    for (p, q) in (0..4).flat_map(|p| (0..4).map(move |q| (p, q))) {
+        let f = |s: f64, t: f64| (0.5 * s).powi(p) * t.powi(q);
+        let at: Vec<[f64; 2]> = places(&s).iter().flat_map(|s| places(&t).into_iter().map(|t| [*s, t])).collect();
+        let rows = at.iter().enumerate().map(|(i, at)| point(i, at, f(at[0], at[1]))).collect();
+        let problem = Problem::new(Space::surface(s, t), 1, Energy::BEND, None, rows).unwrap();
+        let solution = solve(&problem, Method::Cholesky, 1e-12).unwrap();
+        for (i, j) in (0..=20).flat_map(|i| (0..=20).map(move |j| (i, j))) {
+            let (a, b) = (-1.0 + 0.2 * f64::from(i), 0.05 * f64::from(j));
+            let miss = solution.eval(&[a, b], [0, 0])[0] - f(a, b);
+            assert!(miss.abs() < 1e-12 * 1.5_f64.powi(3), "s^{p} t^{q} at ({a}, {b}): {miss:e}");
+        }
+    }
+}
+
+#[test]
 fn normals_couple_the_coordinates_and_free_coordinates_stay_free() {
     let a = Axis::new(Boundary::Open, 8, [0.0, 1.0]).unwrap();
     let corner = |i: usize, s: f64, t: f64, z: f64| {

@@ -129,6 +129,7 @@ pub(crate) struct SurfaceArgs {
 #[command(after_help = "Examples:
   ondelette fit terrain.csv -o terrain.json -o terrain.png      x,y,height a line
   ondelette fit scan.npy --weight 1e-3 -o smooth.npy --report fit.json
+  ondelette fit sketch.csv -o sketch.svg --report fit.json      x,y a line
   ondelette fit wing.dat --fair --tolerance 1e-3 -o wing.svg -o wing.png --comb
 
 Smoothing weight and stiffening are chosen by cross-validation unless given. Height fields: rows run along s, \
@@ -147,7 +148,7 @@ pub(crate) struct FitArgs {
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     pub(crate) stiffening: Option<String>,
 
-    /// Spans a direction, a power of two [default: by the number of points]
+    /// Spans a direction, of surfaces a power of two [default: by the number of points]
     #[arg(long, value_name = "N", allow_hyphen_values = true)]
     pub(crate) spans: Option<String>,
 

@@ -1,5 +1,7 @@
 //! `ondelette curve` and `ondelette surface`: the smoothest shape under constraints.
 
+use super::constraints::constraints;
+use super::intrinsic;
 use super::shape_input::read_text;
 use super::shape_output::Outgoing;
 use super::{Outcome, Refusal, tell};
@@ -7,13 +9,13 @@ use crate::interrupt::Stop;
 use crate::plan::shape::DesignPlan;
 use crate::report::Stages;
 use ondelette_io::shape::picture::Mark;
-use ondelette_io::shape::{ConstraintSpec, Document, Geometry};
+use ondelette_io::shape::{Document, Geometry};
 use ondelette_io::write::write_bytes;
 use ondelette_modeling::Axis;
 use ondelette_modeling::constraint::{Constraint, Demand};
 use ondelette_modeling::energy::{Energy, Stiffness};
 use ondelette_modeling::shape::{Curve, ParametricCurve, ParametricSurface, Surface};
-use ondelette_modeling::solve::{Method, Oracle, Settings, Solution, Solver};
+use ondelette_modeling::solve::{Method, Oracle, Residual, Settings, Solution, Solver};
 use ondelette_modeling::system::{Problem, Space};
 use serde_json::{Value, json};
 use std::fmt::Display;
@@ -28,6 +30,9 @@ pub(crate) fn run(plan: &DesignPlan) -> Result<Outcome, Refusal> {
     let mut document = Document::read(&read_text(&plan.spec)?, Some(plan.axes)).map_err(|e| named(&e))?;
     if let Some(solver) = &plan.solver {
         document.solver.clone_from(solver);
+    }
+    if let Some(minimum) = document.intrinsic {
+        return intrinsic::run(plan, document, minimum, &stop, stages);
     }
     let problem = problem(&document).map_err(|e| named(&e))?;
     let method: Method = document.solver.parse().map_err(|e| named(&e))?;
@@ -63,7 +68,12 @@ pub(crate) fn run(plan: &DesignPlan) -> Result<Outcome, Refusal> {
         return Err(named(&solution.notes().join("; ")));
     }
     document.geometry = geometry(&document.axes, &solution).map_err(|e| named(&e))?;
-    let out = Outgoing { document: &document, around: None, marks: marks(&document, &problem), control: None };
+    let out = Outgoing {
+        document: &document,
+        around: None,
+        marks: marks(&document, problem.constraints(), problem.coordinates()),
+        control: None,
+    };
     out.write(&plan.out)?;
     stages.end("write");
     if let Some(path) = &plan.report {
@@ -89,14 +99,7 @@ pub(crate) fn run(plan: &DesignPlan) -> Result<Outcome, Refusal> {
 
 /// The problem of a document.
 fn problem(document: &Document) -> Result<Problem, String> {
-    if document.constraints.is_empty() {
-        return Err("there are no constraints: nothing holds the shape anywhere".to_owned());
-    }
-    let mut constraints = Vec::new();
-    for spec in &document.constraints {
-        constraints.extend(demands(spec)?);
-    }
-    let coordinates = coordinates(&document.constraints)?;
+    let (constraints, coordinates) = constraints(document)?;
     let [stretch, bend, variation] = document.energy;
     let energy = Energy::new(stretch, bend, variation).map_err(|e| e.to_string())?;
     let space = space(&document.axes);
@@ -104,68 +107,11 @@ fn problem(document: &Document) -> Result<Problem, String> {
     Problem::new(space, coordinates, energy, stiffness, constraints).map_err(|e| e.to_string())
 }
 
-fn space(axes: &[Axis]) -> Space {
+pub(super) fn space(axes: &[Axis]) -> Space {
     match *axes {
         [s, t] => Space::surface(s, t),
         _ => Space::curve(axes[0]),
     }
-}
-
-/// Number of coordinates that the constraints speak of.
-fn coordinates(constraints: &[ConstraintSpec]) -> Result<usize, String> {
-    let mut found: Option<(usize, &str)> = None;
-    for spec in constraints {
-        let id = spec.id.as_deref().unwrap_or_default();
-        let lengths = [&spec.position, &spec.tangent, &spec.ds, &spec.dt].into_iter().flatten().map(Vec::len);
-        for n in lengths.chain(spec.normal.as_ref().map(Vec::len)) {
-            match found {
-                Some((m, first)) if m != n => {
-                    return Err(format!("constraint {id} has {n} coordinates, constraint {first} {m}"));
-                }
-                _ => found = Some((n, id)),
-            }
-        }
-    }
-    found.map(|f| f.0).ok_or_else(|| "no constraint says where the shape is: give positions".to_owned())
-}
-
-/// The demands of one constraint; the first bears its id, others say what they are.
-fn demands(spec: &ConstraintSpec) -> Result<Vec<Constraint>, String> {
-    let id = spec.id.clone().unwrap_or_default();
-    let mut found: Vec<(&str, Demand)> = Vec::new();
-    if let Some(p) = &spec.position {
-        found.push(("position", Demand::Position(p.clone())));
-    }
-    let derivatives = [("tangent", &spec.tangent, 0), ("ds", &spec.ds, 0), ("dt", &spec.dt, 1)];
-    for (name, value, axis) in derivatives {
-        if let Some(d) = value {
-            let fits = if name == "tangent" { spec.at.len() == 1 } else { spec.at.len() == 2 };
-            if !fits {
-                return Err(format!(
-                    "constraint {id}: {name} is for {}",
-                    if name == "tangent" { "curves" } else { "surfaces" }
-                ));
-            }
-            found.push((name, Demand::Derivative(axis, d.clone())));
-        }
-    }
-    if let Some(n) = &spec.normal {
-        found.push(("normal", Demand::Normal(n.clone())));
-    }
-    if let Some(k) = spec.curvature {
-        found.push(("curvature", Demand::Curvature(k)));
-    }
-    if found.is_empty() {
-        return Err(format!("constraint {id} asks for nothing: position, tangent, ds, dt, normal or curvature"));
-    }
-    let single = found.len() == 1;
-    let name = |i: usize, what: &str| if single || i == 0 { id.clone() } else { format!("{id}.{what}") };
-    let make = |(i, (what, demand)): (usize, (&str, Demand))| {
-        let mut c = Constraint::new(name(i, what), &spec.at, demand);
-        c.weight = spec.weight;
-        c
-    };
-    Ok(found.into_iter().enumerate().map(make).collect())
 }
 
 /// One factor a cell from the regions of the document.
@@ -200,7 +146,7 @@ fn geometry(axes: &[Axis], solution: &Solution) -> Result<Geometry, String> {
 }
 
 /// What pictures show of the constraints.
-fn marks(document: &Document, problem: &Problem) -> Vec<Mark> {
+pub(super) fn marks(document: &Document, constraints: &[Constraint], coordinates: usize) -> Vec<Mark> {
     let jet = |at: &[f64]| match &document.geometry {
         Geometry::Curve(c) => {
             let j = c.jet(at[0]);
@@ -212,7 +158,7 @@ fn marks(document: &Document, problem: &Problem) -> Vec<Mark> {
         }
         Geometry::None => None,
     };
-    let heights = problem.coordinates() == 1;
+    let heights = coordinates == 1;
     let place = |values: &[Option<f64>], here: [f64; 3]| -> [f64; 3] {
         let shift = if heights { document.axes.len() } else { 0 };
         std::array::from_fn(|c| match c.checked_sub(shift).and_then(|k| values.get(k)) {
@@ -221,7 +167,7 @@ fn marks(document: &Document, problem: &Problem) -> Vec<Mark> {
         })
     };
     let mut out = Vec::new();
-    for c in problem.constraints() {
+    for c in constraints {
         let Some((here, first)) = jet(&c.at) else { continue };
         match &c.demand {
             Demand::Position(values) if c.weight.is_some() => out.push(Mark::Soft(place(values, here), here)),
@@ -245,15 +191,10 @@ fn report(document: &Document, problem: &Problem, solution: &Solution, stages: &
     let energy_knots: f64 =
         solution.coefficients().iter().map(|x| problem.energy().of(&unit, problem.stiffness(), x)).sum();
     let (method, why) = solution.method();
-    let mut residuals = serde_json::Map::new();
-    for r in solution.residuals() {
-        let worst = residuals.get(&r.id).and_then(Value::as_f64).unwrap_or(0.0);
-        residuals.insert(r.id.clone(), json!(worst.max(r.miss.abs())));
-    }
     json!({
         "energy": solution.energy(),
         "energy_knots": energy_knots,
-        "residuals": residuals,
+        "residuals": worst_by_id(solution.residuals()),
         "iterations": solution.iterations(),
         "control_points": solution.space().len(),
         "active": solution.active().unwrap_or_else(|| solution.space().len()),
@@ -266,4 +207,14 @@ fn report(document: &Document, problem: &Problem, solution: &Solution, stages: &
         "notes": solution.notes(),
         "seconds": stages.json(),
     })
+}
+
+/// The largest miss of each constraint.
+pub(super) fn worst_by_id(residuals: &[Residual]) -> serde_json::Map<String, Value> {
+    let mut out = serde_json::Map::new();
+    for r in residuals {
+        let worst = out.get(&r.id).and_then(Value::as_f64).unwrap_or(0.0);
+        out.insert(r.id.clone(), json!(worst.max(r.miss.abs())));
+    }
+    out
 }

@@ -99,9 +99,48 @@ fn outline_of_svg(text: &str) -> Result<Points, String> {
 
 type Fitted = (Document, Vec<Mark>, Value);
 
+/// The smoothing spline of an outline.
+fn smooth(plan: &FitPlan, points: &Points) -> Result<Fitted, String> {
+    let mut list: Vec<Vec<f64>> = points.points.iter().map(|p| p[..points.dim].to_vec()).collect();
+    // Outlines of aerofoils end in an edge, even where both ends meet.
+    let closed = list.len() > 4 && list.first() == list.last() && Format::of(&plan.data) != Some(Format::Dat);
+    if closed {
+        list.pop();
+    }
+    let settings =
+        FitSettings { weight: plan.weight, stiffening: plan.stiffening, spans: plan.spans, ..FitSettings::default() };
+    let fit = fit::curve(&list, closed, settings).map_err(|e| e.to_string())?;
+    tell(format_args!(
+        "{} points, {} spans{}: rms miss {:.4e}, weight {:.3e}, stiffening {:.3e}{}",
+        list.len(),
+        fit.curve.axis().spans(),
+        if closed { ", closed" } else { "" },
+        fit.rms,
+        fit.weight,
+        fit.stiffening,
+        fit.validation.map(|v| format!(", predicted within {v:.4e} rms")).unwrap_or_default(),
+    ));
+    let report = json!({
+        "points": list.len(),
+        "closed": closed,
+        "spans": fit.curve.axis().spans(),
+        "rms": fit.rms,
+        "weight": fit.weight,
+        "stiffening": fit.stiffening,
+        "validation_rms": fit.validation,
+    });
+    let on = |(p, t): (&Vec<f64>, &f64)| {
+        let given = std::array::from_fn(|c| p.get(c).copied().unwrap_or(0.0));
+        Mark::Soft(given, fit.curve.point(*t))
+    };
+    let marks = if list.len() <= MOST_MARKS { list.iter().zip(&fit.parameters).map(on).collect() } else { Vec::new() };
+    let energy = [fit.stiffening.powi(2), 1.0, 0.0];
+    Ok((Document { energy, ..Document::of_curve(fit.curve) }, marks, report))
+}
+
 fn outline(plan: &FitPlan, points: &Points) -> Result<Fitted, String> {
     if !plan.fair {
-        return Err("an outline is fitted fairly: give --fair and --tolerance DISTANCE".to_owned());
+        return smooth(plan, points);
     }
     let tolerance = plan.tolerance.ok_or("--fair needs --tolerance: how far a point may move")?;
     let list: Vec<Vec<f64>> = points.points.iter().map(|p| p[..points.dim].to_vec()).collect();

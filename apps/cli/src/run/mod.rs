@@ -1,9 +1,11 @@
 //! Doing it.
 
+mod constraints;
 pub(crate) mod design;
 pub(crate) mod edit;
 pub(crate) mod fit;
 pub(crate) mod info;
+mod intrinsic;
 pub(crate) mod light;
 pub(crate) mod probe;
 pub(crate) mod relight;

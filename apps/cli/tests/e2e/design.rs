@@ -63,6 +63,74 @@ fn an_adaptive_surface_says_how_few_wavelets_hold_it() {
 }
 
 #[test]
+fn an_intrinsic_energy_finds_the_circle_and_says_when_there_is_no_minimum() {
+    let place = Place::new();
+    let points = r#""constraints": [ { "id": "e", "at": 0, "position": [1, 0] }, { "at": 0.25, "position": [0, 1] },
+        { "at": 0.5, "position": [-1, 0] }, { "at": 0.75, "position": [0, -1] } ] }"#;
+    place.write(
+        "ring.json",
+        format!(r#"{{ "boundary": "periodic", "spans": 128, "energy": {{ "intrinsic": "mvc" }}, {points}"#),
+    );
+    place.run("curve ring.json -o out.json -o out.svg -o out.png --comb --report r.json").with_code(0);
+    let report = document(&place, "r.json");
+    assert!((report["length"].as_f64().unwrap() - std::f64::consts::TAU).abs() < 1e-6, "{report}");
+    assert!(report["functional"].as_f64().unwrap() < 1e-9 && report["iterations"].as_u64().unwrap() < 40, "{report}");
+    assert_eq!(document(&place, "out.json")["energy"], json!({ "intrinsic": "mvc" }));
+    // The document goes in again, and edits.
+    place.run("curve out.json -o again.json").with_code(0);
+    place.run("edit out.json --level 2 --move 2 0,1 -o edited.json").with_code(0);
+    // A loop held at three points of nearly a line opens without end.
+    place.write(
+        "loose.json",
+        r#"{ "boundary": "periodic", "spans": 32, "energy": { "intrinsic": "mec" }, "constraints": [
+            { "at": 0, "position": [1, 0] }, { "at": 0.25, "position": [0, 0.2] }, { "at": 0.5, "position": [-1, 0] } ] }"#,
+    );
+    let ended = place.run("curve loose.json -o loose-out.json").with_code(1);
+    assert!(ended.err.contains("without bound") && ended.err.contains("not converged"), "{}", ended.err);
+}
+
+#[test]
+fn a_surface_is_led_along_curves_and_mirrored() {
+    let place = Place::new();
+    let arch = "[0, 0, 0], [1, 0, 0.5], [2, 0, 0]";
+    place.write(
+        "tent.json",
+        format!(
+            r#"{{ "levels": 4, "constraints": [
+            {{ "id": "front", "curve": {{ "at": [[0, 0], [1, 0]], "position": [{arch}] }} }},
+            {{ "id": "spine", "curve": {{ "at": [[0.2, 0], [0.5, 0.4], [0.6, 1]],
+                "position": [[0.4, 0, 0.284], [1, 1, 1], [1.2, 2, 0]] }} }},
+            {{ "id": "corner", "at": [0, 1], "position": [0, 2, 0] }},
+            {{ "id": "other", "at": [1, 1], "image": {{ "of": [0, 1], "factors": [-1, 1, 1], "offset": [2, 0, 0] }} }} ] }}"#
+        ),
+    );
+    let ended = place.run("surface tent.json -o out.json -o out.png --report r.json");
+    let report = if ended.code == Some(0) { document(&place, "r.json") } else { panic!("{}", ended.err) };
+    let residuals = report["residuals"].as_object().unwrap();
+    assert!(residuals.len() > 30 && residuals.contains_key("front[16]") && residuals.contains_key("spine[20]"));
+    assert!(residuals.values().all(|v| v.as_f64().unwrap() < 1e-9), "{report}");
+    let points = document(&place, "out.json")["points"].take();
+    let corner = |i: usize, j: usize, c: usize| points[i][j][c].as_f64().unwrap();
+    // s runs along rows, the other corner mirrors the first; the middle of the front edge is the top of its arch.
+    assert!((corner(18, 18, 0) - 2.0).abs() < 1e-9 && (corner(18, 18, 1) - 2.0).abs() < 1e-9);
+    assert_eq!(document(&place, "out.json")["constraints"][0]["curve"]["at"], json!([[0.0, 0.0], [1.0, 0.0]]));
+    // A sample that says the same again is named; one that says otherwise refused.
+    let twice = |z: f64| {
+        format!(
+            r#"{{ "levels": 3, "constraints": [
+            {{ "id": "a", "curve": {{ "at": [[0, 0], [1, 0]], "position": [[0], [1]] }} }},
+            {{ "id": "b", "curve": {{ "at": [[1, 0], [0, 0]], "position": [[{z}], [0]] }} }} ] }}"#
+        )
+    };
+    place.write("twice.json", twice(1.0));
+    let ended = place.run("surface twice.json -o twice-out.json").with_code(0);
+    assert!(ended.err.contains("b[0]") && ended.err.contains("redundant"), "{}", ended.err);
+    place.write("clash.json", twice(1.5));
+    let ended = place.run("surface clash.json -o clash-out.json").with_code(2);
+    assert!(ended.err.contains("b[0]") && ended.err.contains("contradicts"), "{}", ended.err);
+}
+
+#[test]
 fn a_tilted_plane_is_found_and_written_in_every_format() {
     let place = Place::new();
     place.write(
@@ -111,6 +179,30 @@ fn specifications_that_make_no_sense_are_refused_by_name() {
             constraints(a).replace("{ \"levels\"", "{ \"adaptive\": true, \"solver\": \"banded\", \"levels\""),
             "adaptive",
         ),
+        ("curve", constraints(a).replace("{ \"levels\"", "{ \"energy\": { \"intrinsic\": 3 }, \"levels\""), "mec"),
+        (
+            "curve",
+            constraints(a).replace("{ \"levels\"", "{ \"energy\": { \"intrinsic\": \"mic\" }, \"levels\""),
+            "mic",
+        ),
+        (
+            "curve",
+            constraints(a).replace("{ \"levels\"", "{ \"energy\": { \"intrinsic\": \"mec\" }, \"levels\""),
+            "coincide",
+        ),
+        (
+            "surface",
+            constraints(a).replace("{ \"levels\"", "{ \"energy\": { \"intrinsic\": \"mec\" }, \"levels\""),
+            "curves",
+        ),
+        ("surface", constraints(r#"{ "id": "q", "curve": { "at": [[0, 0]], "position": [[1], [2]] } }"#), "q"),
+        (
+            "surface",
+            constraints(r#"{ "id": "q", "curve": { "at": [[0, 0], [1, 2]], "position": [[1], [2]] } }"#),
+            "outside",
+        ),
+        ("curve", constraints(r#"{ "id": "q", "curve": { "at": [[0, 0], [1, 1]], "position": [[1], [2]] } }"#), "q"),
+        ("curve", constraints(r#"{ "id": "q", "position": [1, 2] }"#), "at is missing"),
         ("surface", constraints(a), "a"),
         ("surface", r#"{ "kind": "curve", "levels": 3 }"#.to_owned(), "surface"),
     ] {

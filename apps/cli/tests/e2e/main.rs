@@ -1,5 +1,6 @@
 //! The program as its users meet it: files, exit codes, messages.
 
+mod damage;
 mod design;
 mod edit;
 mod fit;

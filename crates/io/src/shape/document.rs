@@ -4,6 +4,7 @@
 //! says its schema and version, and holds the control points. Ids and their order are kept.
 
 use ondelette_modeling::Axis;
+use ondelette_modeling::intrinsic::Minimum;
 use ondelette_modeling::shape::{Curve, Surface};
 use ondelette_wavelet::Boundary;
 use serde::{Deserialize, Serialize};
@@ -44,9 +45,15 @@ pub struct ConstraintSpec {
     /// Name; given by position (`c0`, `c1`, ...) if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub id: Option<String>,
-    /// Parameter, `t` or `[s, t]`.
-    #[serde(deserialize_with = "one_or_many")]
+    /// Parameter, `t` or `[s, t]`; of a curve on a surface none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty", deserialize_with = "one_or_many")]
     pub at: Vec<f64>,
+    /// A curve on a surface, sampled.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub curve: Option<RailSpec>,
+    /// The point here is that of another parameter, reflected or shifted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub image: Option<ImageSpec>,
     /// Point; null leaves a coordinate free.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "coordinates")]
     pub position: Option<Vec<Option<f64>>>,
@@ -68,6 +75,34 @@ pub struct ConstraintSpec {
     /// Soft with this weight; exact if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub weight: Option<f64>,
+}
+
+/// A curve on a surface: where it runs and what it passes through, each a smooth curve through its list.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RailSpec {
+    /// Parameters `[s, t]` that it runs through, two or more.
+    pub at: Vec<[f64; 2]>,
+    /// Points that the surface has along it, two or more.
+    pub position: Vec<Vec<f64>>,
+    /// How often it is sampled; left out: by the spans that it crosses.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub samples: Option<usize>,
+}
+
+/// The point at another parameter times factors plus an offset: symmetries and joins.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ImageSpec {
+    /// The other parameter.
+    #[serde(deserialize_with = "one_or_many")]
+    pub of: Vec<f64>,
+    /// A factor a coordinate.
+    #[serde(deserialize_with = "one_or_many")]
+    pub factors: Vec<f64>,
+    /// An offset a coordinate; zero if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub offset: Option<Vec<f64>>,
 }
 
 /// A part of the domain with another stiffness; later regions win.
@@ -93,6 +128,8 @@ pub struct Document {
     pub geometry: Geometry,
     /// Weights of stretch, bend and variation.
     pub energy: [f64; 3],
+    /// A functional of the shape alone in place of the energy; of curves.
+    pub intrinsic: Option<Minimum>,
     /// Constraints in order.
     pub constraints: Vec<ConstraintSpec>,
     /// Weight map of the energy.
@@ -229,6 +266,7 @@ impl Document {
             axes,
             geometry: Geometry::None,
             energy: [0.0, 1.0, 0.0],
+            intrinsic: None,
             constraints: Vec::new(),
             stiffness: Vec::new(),
             solver: "auto".to_owned(),
@@ -308,12 +346,23 @@ impl Document {
         if !raw.energy.is_empty() {
             self.energy = [0.0; 3];
         }
-        for (name, value) in &raw.energy {
+        if let Some(value) = raw.energy.get("intrinsic") {
+            if raw.energy.len() > 1 {
+                return Err("energy: intrinsic stands alone, without stretch, bend and variation".to_owned());
+            }
+            if self.axes.len() != 1 {
+                return Err("energy intrinsic: it is for curves".to_owned());
+            }
+            let name = value.as_str().ok_or_else(|| format!("energy intrinsic {value}: \"mec\" or \"mvc\""))?;
+            self.intrinsic = Some(name.parse().map_err(|e| format!("energy: {e}"))?);
+            self.energy = [0.0, 1.0, 0.0];
+        }
+        for (name, value) in raw.energy.iter().filter(|e| e.0 != "intrinsic") {
             let slot = match name.as_str() {
                 "stretch" => 0,
                 "bend" => 1,
                 "variation" => 2,
-                _ => return Err(format!("energy {name:?}: stretch, bend and variation are known")),
+                _ => return Err(format!("energy {name:?}: stretch, bend, variation and intrinsic are known")),
             };
             let weight = value.as_f64().filter(|x| *x >= 0.0 && x.is_finite());
             self.energy[slot] = weight.ok_or_else(|| format!("energy {name} {value}: a number from 0 on is needed"))?;
@@ -374,7 +423,10 @@ impl Document {
             "boundary": list(self.axes.iter().map(|a| name(a.boundary()).into()).collect()),
             "spans": list(self.axes.iter().map(|a| a.spans().into()).collect()),
             "domain": list(self.axes.iter().map(|a| json!(a.domain())).collect()),
-            "energy": { "stretch": self.energy[0], "bend": self.energy[1], "variation": self.energy[2] },
+            "energy": match self.intrinsic {
+                Some(minimum) => json!({ "intrinsic": minimum.to_string() }),
+                None => json!({ "stretch": self.energy[0], "bend": self.energy[1], "variation": self.energy[2] }),
+            },
             "constraints": self.constraints,
             "solver": self.solver,
             "tolerance": self.tolerance,

@@ -24,7 +24,9 @@ pub mod points;
 pub mod step;
 pub mod svg;
 
-pub use document::{ConstraintSpec, Document, Geometry, MOST_POINTS, Region, SCHEMA, VERSION, YAxis};
+pub use document::{
+    ConstraintSpec, Document, Geometry, ImageSpec, MOST_POINTS, RailSpec, Region, SCHEMA, VERSION, YAxis,
+};
 
 use ondelette_modeling::free::{FreeCurve, FreeSurface};
 

@@ -5,9 +5,11 @@
 
 pub(crate) mod curvature;
 mod functional;
+mod rail;
 mod row;
 
 pub(crate) use functional::Functional;
+pub use rail::along;
 pub(crate) use row::Row;
 
 use crate::system::Space;

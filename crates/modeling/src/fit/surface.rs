@@ -4,6 +4,7 @@
 //! multigrid conjugate gradients. Weight and stiffening are chosen by cross-validation unless given: points are left
 //! out in turns, and the pair that predicts them best is taken.
 
+use super::choose::{BEGIN, STEPS, search};
 use super::normal::Normal;
 use crate::axis::{Axis, AxisError};
 use crate::basis;
@@ -74,6 +75,12 @@ pub enum FitError {
     /// A weight that is none.
     #[error(transparent)]
     Energy(#[from] EnergyError),
+    /// Too few points of an outline, or points that make no curve.
+    #[error("{0} points: an outline needs at least 4, all of 2 or 3 finite coordinates, not all in one place")]
+    Outline(usize),
+    /// The inner solver failed.
+    #[error(transparent)]
+    Solve(#[from] crate::solve::SolveError),
     /// Spans that cannot be solved on.
     #[error("{0} spans: give a power of two from 4 to 1024")]
     Spans(usize),
@@ -155,31 +162,35 @@ pub fn surface(data: &Scatter, settings: FitSettings) -> Result<Fit, FitError> {
     let side = ((domain[0][1] - domain[0][0]) * (domain[1][1] - domain[1][0])).sqrt();
     let mean = data.values.iter().sum::<f64>() / m as f64;
     let centred: Vec<f64> = data.values.iter().map(|v| v - mean).collect();
-    let mut spaces = vec![space.clone()];
-    while let Some(next) = spaces[spaces.len() - 1].coarser().filter(|_| spaces[spaces.len() - 1].len() > 60) {
-        spaces.push(next);
-    }
-    let mut choice = Choice { spaces: &spaces, data, values: &centred, side, folds: Vec::new() };
     let unit = m as f64 * side * side;
     let (mut weight, mut stiffening) = (settings.weight, settings.stiffening);
     let mut validation = None;
+    let mut start = None;
     if (weight.is_none() || stiffening.is_none()) && m > 3 {
-        // A coarser surface tells the same weights where there are many spans.
-        let few = if m > 20_000 { 1 } else { 10 };
-        choice.leave_out(few, 10);
-        let (w, s, v) = choice.search(unit, weight, stiffening)?;
+        let given = [weight, stiffening];
+        let mut parts = Part::windows(&space, &data.points, &centred, side)?;
+        let (mut begin, mut steps) = (BEGIN, &STEPS[..]);
+        // A coarser surface finds nearly the same weights; the last steps are the fine one's.
+        if let (1, Some(coarse)) = (parts.len(), space.coarser().filter(|c| c.axes()[0].spans() >= 32)) {
+            let mut parts = Part::windows(&coarse, &data.points, &centred, side)?;
+            let found = search(unit, given, begin, &STEPS[..2], &mut |w, s| Part::validate_all(&mut parts, w, s))?;
+            (begin, steps) = ([found.0 / unit, found.1], &STEPS[2..]);
+        }
+        let (w, s, v) = search(unit, given, begin, steps, &mut |w, s| Part::validate_all(&mut parts, w, s))?;
         (weight, stiffening, validation) = (Some(w), Some(s), Some(v));
+        if let [whole] = &mut parts[..] {
+            start = whole.folds.first_mut().map(|f| std::mem::take(&mut f.x));
+        }
     }
     let weight = weight.unwrap_or(1e-9 * unit);
     let stiffening = stiffening.unwrap_or(0.0);
-    let start = choice.folds.first().map(|f| f.x.clone());
-    choice.folds.clear();
-    let mut all = choice.fold(&|_| false);
-    if let Some(start) = start {
+    let whole = Part::new(space.clone(), data.points.clone(), centred, side);
+    let mut all = whole.fold(&|_| false);
+    if let Some(start) = start.filter(|x| x.len() == all.x.len()) {
         all.x = start;
     }
-    choice.solve(&mut all, weight, stiffening, 1e-8)?;
-    let miss = |i: usize| eval(&space, &all.x, data.points[i]) - centred[i];
+    whole.solve(&mut all, weight, stiffening, 1e-8)?;
+    let miss = |i: usize| eval(&space, &all.x, data.points[i]) - whole.values[i];
     let rms = ((0..m).map(|i| miss(i).powi(2)).sum::<f64>() / m as f64).sqrt();
     // The B-splines sum to one.
     let coefficients = all.x.iter().map(|v| v + mean).collect();
@@ -192,18 +203,67 @@ fn eval(space: &Space, x: &[f64], p: [f64; 2]) -> f64 {
     s.iter().map(|(i, v)| v * t.apply(&x[i * n..][..n])).sum()
 }
 
-struct Choice<'a> {
-    spaces: &'a [Space],
-    data: &'a Scatter,
-    values: &'a [f64],
+/// Data on a part of the domain, or the whole of it: what cross-validation works on.
+struct Part {
+    /// From fine to coarse.
+    spaces: Vec<Space>,
+    points: Vec<[f64; 2]>,
+    values: Vec<f64>,
+    /// Side of the whole domain.
     side: f64,
     folds: Vec<Fold>,
 }
 
-impl Choice<'_> {
+/// Points that a window aims at.
+const WINDOW: f64 = 2000.0;
+/// Windows on which the smoothing of many points is chosen.
+const WINDOWS: u64 = 6;
+
+impl Part {
+    fn new(space: Space, points: Vec<[f64; 2]>, values: Vec<f64>, side: f64) -> Part {
+        let mut spaces = vec![space];
+        while let Some(next) = spaces[spaces.len() - 1].coarser().filter(|_| spaces[spaces.len() - 1].len() > 60) {
+            spaces.push(next);
+        }
+        Part { spaces, points, values, side, folds: Vec::new() }
+    }
+
+    /// The whole domain with ten folds; or, where there are many points, windows of it with the same knots, as dense as
+    /// it is: energy and misses are sums over places, so that the best weights there are the best ones of the whole.
+    /// Each is around a point, so that there are more where the points are.
+    fn windows(space: &Space, points: &[[f64; 2]], values: &[f64], side: f64) -> Result<Vec<Part>, FitError> {
+        let axes = space.axes();
+        let spans = axes[0].spans();
+        let share = (WINDOW / points.len() as f64).sqrt();
+        let few = ((spans as f64 * share).ceil() as usize).next_power_of_two().max(16).min(spans);
+        if few == spans {
+            let mut part = Part::new(space.clone(), points.to_vec(), values.to_vec(), side);
+            part.leave_out(10, 10);
+            return Ok(vec![part]);
+        }
+        let mut parts = Vec::new();
+        for k in 0..WINDOWS {
+            let centre = points[(seed::mix(k ^ 0x0e11) % points.len() as u64) as usize];
+            let range = |a: usize| {
+                let axis = &axes[a];
+                let first = (axis.to_knots(centre[a]) - 0.5 * few as f64).round().clamp(0.0, (spans - few) as f64);
+                [axis.from_knots(first), axis.from_knots(first + few as f64)]
+            };
+            let frame = [range(0), range(1)];
+            let inside = |i: &usize| (0..2).all(|a| (frame[a][0]..=frame[a][1]).contains(&points[*i][a]));
+            let chosen: Vec<usize> = (0..points.len()).filter(inside).collect();
+            let axis = |a: usize| Axis::new(Boundary::Open, few, frame[a]);
+            let (places, heights) = chosen.iter().map(|i| (points[*i], values[*i])).unzip();
+            let mut part = Part::new(Space::surface(axis(0)?, axis(1)?), places, heights, side);
+            part.leave_out(2, 10);
+            parts.push(part);
+        }
+        Ok(parts)
+    }
+
     fn fold(&self, out: &dyn Fn(usize) -> bool) -> Fold {
         let kept = |i: &usize| !out(*i);
-        let points = &self.data.points;
+        let points = &self.points;
         let m = points.len();
         let normals =
             self.spaces.iter().map(|s| Arc::new(Normal::new(s, (0..m).filter(kept).map(|i| &points[i])))).collect();
@@ -237,55 +297,30 @@ impl Choice<'_> {
         Ok(())
     }
 
-    /// Root mean square of the predictions of what the folds leave out.
-    fn validate(&mut self, weight: f64, stiffening: f64) -> Result<f64, FitError> {
+    /// Root mean square of the predictions of what all folds leave out.
+    fn validate_all(parts: &mut [Part], weight: f64, stiffening: f64) -> Result<f64, FitError> {
+        let (mut sum, mut count) = (0.0, 0);
+        for part in parts {
+            let (s, c) = part.validate(weight, stiffening)?;
+            sum += s;
+            count += c;
+        }
+        Ok((sum / count.max(1) as f64).sqrt())
+    }
+
+    /// Sum of squares and number of the predictions of what the folds leave out.
+    fn validate(&mut self, weight: f64, stiffening: f64) -> Result<(f64, usize), FitError> {
         let (mut sum, mut count) = (0.0, 0);
         let mut folds = std::mem::take(&mut self.folds);
         for fold in &mut folds {
-            fold.x.fill(0.0);
+            // From the solution of the last weights: neighbours are alike.
             self.solve(fold, weight, stiffening, 1e-4)?;
             for &i in &fold.out {
-                sum += (eval(&self.spaces[0], &fold.x, self.data.points[i]) - self.values[i]).powi(2);
+                sum += (eval(&self.spaces[0], &fold.x, self.points[i]) - self.values[i]).powi(2);
                 count += 1;
             }
         }
         self.folds = folds;
-        Ok((sum / count.max(1) as f64).sqrt())
-    }
-
-    /// A search along both logarithms in turns, with halved steps.
-    fn search(&mut self, unit: f64, weight: Option<f64>, stiffening: Option<f64>) -> Result<(f64, f64, f64), FitError> {
-        let mut at = [weight.map_or(-8.0, |w| (w / unit).log10()), stiffening.map_or(1.0, |s| s.max(1e-3).log10())];
-        let value = |me: &mut Self, at: [f64; 2]| -> Result<f64, FitError> {
-            let s = stiffening.unwrap_or(10.0_f64.powf(at[1]));
-            me.validate(10.0_f64.powf(at[0]) * unit, s)
-        };
-        let free = [weight.is_none(), stiffening.is_none()];
-        let mut best = value(self, at)?;
-        for step in [[1.0, 0.5], [0.5, 0.25], [0.25, 0.12]] {
-            // Along the axes and both diagonals, as long as it helps.
-            let mut moved = true;
-            while moved {
-                moved = false;
-                for (a, b) in [(-1.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.0, -1.0), (1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)]
-                {
-                    if (a != 0.0 && !free[0]) || (b != 0.0 && !free[1]) {
-                        continue;
-                    }
-                    loop {
-                        let next = [at[0] + a * step[0], at[1] + b * step[1]];
-                        if !(-16.0..=2.0).contains(&next[0]) || !(-1.0..=2.5).contains(&next[1]) {
-                            break;
-                        }
-                        let got = value(self, next)?;
-                        if got >= best {
-                            break;
-                        }
-                        (best, at, moved) = (got, next, true);
-                    }
-                }
-            }
-        }
-        Ok((10.0_f64.powf(at[0]) * unit, stiffening.unwrap_or(10.0_f64.powf(at[1])), best))
+        Ok((sum, count))
     }
 }

@@ -27,6 +27,10 @@ const SPREAD_TOLERANCE: f64 = 0.15;
 /// Most Krylov vectors for it.
 const SPREAD_STEPS: usize = 12;
 
+/// What is left over reaches this many times as much as direct light does, where that is less than the worst case of
+/// the brightest material everywhere.
+const AMPLIFIED: f64 = 3.0;
+
 /// A sweep with all samples.
 pub(super) struct Sweep {
     /// What every leaf sends on.
@@ -52,7 +56,13 @@ impl Sampled {
     /// Begins a sweep of the present solution.
     pub(super) fn start_sweeping(&mut self) {
         let mut radiosity = self.direct_light();
+        let direct = self.integral(&radiosity);
         self.add_indirect(&self.indirect, &mut radiosity);
+        self.amplification = 1.0 / (1.0 - self.highest_reflectance());
+        if self.corrections > 0 && direct > 0.0 {
+            let seen = AMPLIFIED * self.integral(&radiosity) / direct;
+            self.amplification = self.amplification.min(seen.max(1.0));
+        }
         self.reflect(&mut radiosity, true);
         let empty = vec![[0.0; 3]; self.indirect.len()];
         self.phase = Phase::Sweeping(Sweep { radiosity, gathered: empty.clone(), apart: empty, done: 0 });
@@ -109,7 +119,7 @@ impl Sampled {
         self.corrections = 0;
         self.indirect = sweep.gathered;
         let passed = vec![[0.0; 3]; self.indirect.len()];
-        self.start_spreading(sweep.apart, passed, 0, left / (1.0 - self.highest_reflectance()));
+        self.start_spreading(sweep.apart, passed, 0, left * self.amplification);
     }
 
     pub(super) fn solve(&mut self, mut gmres: Box<Gmres<3>>) -> Event {
@@ -243,7 +253,7 @@ impl Sampled {
     /// Residual at which a solve ends: no finer than the present error needs, which is refined anyway.
     fn wanted(&self) -> f64 {
         let tolerance = self.settings.error.max(0.3 * self.error.min(0.3));
-        0.1 * tolerance * (1.0 - self.highest_reflectance())
+        0.1 * tolerance / self.amplification
     }
 
     /// Residual relative to the whole irradiance.

@@ -190,6 +190,7 @@ impl Sampled {
             whole: 0.0,
             cap: None,
             streaming: kept.gathers.iter().any(|g| g[2] > Gather::FIRST && g[4] == 0),
+            amplification: 1.0,
             corrections: 0,
             aim: plan::AIM,
             rounds: 0,

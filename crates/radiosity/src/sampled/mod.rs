@@ -100,6 +100,8 @@ pub(crate) struct Sampled {
     /// Counted bytes that elements and samples may take, and whether only the first samples are stored.
     cap: Option<u64>,
     streaming: bool,
+    /// How much more of a residual there is once it was reflected as often as it can be.
+    amplification: f64,
     /// Solves of the present samples so far.
     corrections: u32,
     /// What share of the promise batches aim at.
@@ -161,6 +163,7 @@ impl Sampled {
             whole: 0.0,
             cap: None,
             streaming: false,
+            amplification: 1.0,
             corrections: 0,
             aim: plan::AIM,
             rounds: 0,
