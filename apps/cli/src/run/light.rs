@@ -76,7 +76,6 @@ fn light(plan: &LightPlan, stop: Stop) -> Result<Outcome, Refusal> {
 }
 
 /// Everything after the solver's last step: files, ledger, picture, report, summary.
-#[expect(clippy::too_many_arguments, reason = "the parts of one run, in the order in which they came to be")]
 pub(super) fn finish(
     plan: &LightPlan,
     solver: Solver,

@@ -49,8 +49,8 @@ fn an_adaptive_surface_says_how_few_wavelets_hold_it() {
     let spec = r#"{ "boundary": "mirror", "levels": 5, ADAPTIVE "constraints": [
         { "id": "a", "at": [0, 0], "position": 1 },
         { "id": "b", "at": [0.5, 0.5], "position": 0 }, { "id": "c", "at": [1, 0.3], "position": -1 } ] }"#;
-    place.write("few.json", &spec.replace("ADAPTIVE", "\"adaptive\": true,"));
-    place.write("all.json", &spec.replace("ADAPTIVE", ""));
+    place.write("few.json", spec.replace("ADAPTIVE", "\"adaptive\": true,"));
+    place.write("all.json", spec.replace("ADAPTIVE", ""));
     let ended = place.run("surface few.json -o few.npy --report few-r.json").with_code(0);
     assert!(ended.err.contains("active wavelets"), "{}", ended.err);
     place.run("surface all.json -o all.npy --report all-r.json").with_code(0);
