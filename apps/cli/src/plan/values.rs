@@ -59,7 +59,7 @@ pub(crate) fn memory(text: &str) -> Result<u64, String> {
         _ => return Err(wrong()),
     };
     let bytes = factor * trimmed[..unit].trim().parse::<f64>().map_err(|_| wrong())?;
-    if bytes >= 1e6 && bytes <= 1e15 { Ok(bytes as u64) } else { Err(format!("{}; at least 1MB", wrong())) }
+    if (1e6..=1e15).contains(&bytes) { Ok(bytes as u64) } else { Err(format!("{}; at least 1MB", wrong())) }
 }
 
 /// One number, or three with commas between.

@@ -15,10 +15,13 @@ use ondelette_modeling::Axis;
 use ondelette_modeling::constraint::{Constraint, Demand};
 use ondelette_modeling::energy::{Energy, Stiffness};
 use ondelette_modeling::shape::{Curve, ParametricCurve, ParametricSurface, Surface};
-use ondelette_modeling::solve::{Method, Residual, Settings, Solution, Solver};
+use ondelette_modeling::solve::{Method, Oracle, Residual, Settings, Solution, Solver};
 use ondelette_modeling::system::{Problem, Space};
 use serde_json::{Value, json};
 use std::fmt::Display;
+
+/// How far above the least energy an adaptive solution may be, of the energy.
+const ADAPTIVE: f64 = 1e-3;
 
 pub(crate) fn run(plan: &DesignPlan) -> Result<Outcome, Refusal> {
     let stop = Stop::new(None, plan.folders())?;
@@ -36,17 +39,29 @@ pub(crate) fn run(plan: &DesignPlan) -> Result<Outcome, Refusal> {
     let settings = Settings { method, tolerance: document.tolerance, ..Settings::default() };
     stages.end("read");
 
-    let mut solver = Solver::new(problem.clone(), settings).map_err(|e| named(&e))?;
-    stages.end("prepare");
-    let mut stopped = false;
-    while solver.step().is_some() {
-        stopped = stop.signalled();
-        if stopped {
-            tell("stopped by Ctrl-C: what follows is the state reached");
-            break;
+    let (solution, stopped) = if document.adaptive {
+        if !matches!(method, Method::Auto | Method::Wavelet) {
+            return Err(named(&format!("solver {method}: an adaptive set is one of wavelets; solver auto or wavelet")));
         }
+        let mut oracle = Oracle::new(problem.clone(), ADAPTIVE).map_err(|e| named(&e))?;
+        stages.end("prepare");
+        let mut stopped = false;
+        while !stopped && oracle.step().map_err(|e| named(&e))?.is_some() {
+            stopped = stop.signalled();
+        }
+        (oracle.solution(), stopped)
+    } else {
+        let mut solver = Solver::new(problem.clone(), settings).map_err(|e| named(&e))?;
+        stages.end("prepare");
+        let mut stopped = false;
+        while !stopped && solver.step().is_some() {
+            stopped = stop.signalled();
+        }
+        (solver.solution(), stopped)
+    };
+    if stopped {
+        tell("stopped by Ctrl-C: what follows is the state reached");
     }
-    let solution = solver.solution();
     stages.end("solve");
     // A solver that could not begin has no state worth writing.
     if !solution.converged() && !stopped && solution.iterations() == 0 && !solution.notes().is_empty() {
@@ -68,8 +83,9 @@ pub(crate) fn run(plan: &DesignPlan) -> Result<Outcome, Refusal> {
     let (method, _) = solution.method();
     let worst = solution.residuals().iter().filter(|r| !r.soft).fold(0.0_f64, |m, r| m.max(r.miss.abs()));
     let points = solution.space().len();
+    let active = solution.active().map_or_else(String::new, |n| format!("{n} active wavelets for "));
     tell(format_args!(
-        "{points} control points, {} constraints, solver {method}: energy {:.6e}, largest miss {worst:.1e}",
+        "{active}{points} control points, {} constraints, solver {method}: energy {:.6e}, largest miss {worst:.1e}",
         problem.constraints().len(),
         solution.energy(),
     ));
@@ -83,9 +99,6 @@ pub(crate) fn run(plan: &DesignPlan) -> Result<Outcome, Refusal> {
 
 /// The problem of a document.
 fn problem(document: &Document) -> Result<Problem, String> {
-    if document.adaptive {
-        return Err("adaptive: no solver of this version works on an adaptive set; leave it out".to_owned());
-    }
     let (constraints, coordinates) = constraints(document)?;
     let [stretch, bend, variation] = document.energy;
     let energy = Energy::new(stretch, bend, variation).map_err(|e| e.to_string())?;
@@ -184,7 +197,8 @@ fn report(document: &Document, problem: &Problem, solution: &Solution, stages: &
         "residuals": worst_by_id(solution.residuals()),
         "iterations": solution.iterations(),
         "control_points": solution.space().len(),
-        "active": solution.space().len(),
+        "active": solution.active().unwrap_or_else(|| solution.space().len()),
+        "excess": solution.excess(),
         "coordinates": problem.coordinates(),
         "converged": solution.converged(),
         "solver": method.to_string(),

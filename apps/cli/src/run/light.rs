@@ -76,7 +76,6 @@ fn light(plan: &LightPlan, stop: Stop) -> Result<Outcome, Refusal> {
 }
 
 /// Everything after the solver's last step: files, ledger, picture, report, summary.
-#[allow(clippy::too_many_arguments)]
 pub(super) fn finish(
     plan: &LightPlan,
     solver: Solver,

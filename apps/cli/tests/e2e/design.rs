@@ -44,6 +44,25 @@ fn the_natural_spline_comes_out_of_a_specification() {
 }
 
 #[test]
+fn an_adaptive_surface_says_how_few_wavelets_hold_it() {
+    let place = Place::new();
+    let spec = r#"{ "boundary": "mirror", "levels": 5, ADAPTIVE "constraints": [
+        { "id": "a", "at": [0, 0], "position": 1 },
+        { "id": "b", "at": [0.5, 0.5], "position": 0 }, { "id": "c", "at": [1, 0.3], "position": -1 } ] }"#;
+    place.write("few.json", spec.replace("ADAPTIVE", "\"adaptive\": true,"));
+    place.write("all.json", spec.replace("ADAPTIVE", ""));
+    let ended = place.run("surface few.json -o few.npy --report few-r.json").with_code(0);
+    assert!(ended.err.contains("active wavelets"), "{}", ended.err);
+    place.run("surface all.json -o all.npy --report all-r.json").with_code(0);
+    let (few, all) = (document(&place, "few-r.json"), document(&place, "all-r.json"));
+    let number = |r: &Value, name: &str| r[name].as_f64().unwrap();
+    assert!(number(&few, "active") < 200.0 && number(&all, "active") == 1089.0, "{few}");
+    let over = number(&few, "energy") / number(&all, "energy") - 1.0;
+    assert!((0.0..1e-3).contains(&over) && over * number(&all, "energy") <= number(&few, "excess"), "{over}");
+    assert!(["a", "b", "c"].iter().all(|id| number(&few["residuals"], id).abs() < 1e-12));
+}
+
+#[test]
 fn an_intrinsic_energy_finds_the_circle_and_says_when_there_is_no_minimum() {
     let place = Place::new();
     let points = r#""constraints": [ { "id": "e", "at": 0, "position": [1, 0] }, { "at": 0.25, "position": [0, 1] },
@@ -155,7 +174,11 @@ fn specifications_that_make_no_sense_are_refused_by_name() {
         ("curve", constraints(&format!(r#"{a}, {{ "id": "b", "at": 0.5, "position": [1, 3] }}"#)), "b contradicts"),
         ("curve", constraints(a).replace("{ \"levels\"", "{ \"solver\": \"magic\", \"levels\""), "magic"),
         ("curve", constraints(a).replace("{ \"levels\"", "{ \"solver\": \"spectral\", \"levels\""), "spectral"),
-        ("curve", constraints(a).replace("{ \"levels\"", "{ \"adaptive\": true, \"levels\""), "adaptive"),
+        (
+            "curve",
+            constraints(a).replace("{ \"levels\"", "{ \"adaptive\": true, \"solver\": \"banded\", \"levels\""),
+            "adaptive",
+        ),
         ("curve", constraints(a).replace("{ \"levels\"", "{ \"energy\": { \"intrinsic\": 3 }, \"levels\""), "mec"),
         (
             "curve",

@@ -187,7 +187,10 @@ mod tests {
 
     #[test]
     fn colours_are_the_radiance_under_the_tone_curve() {
-        let solution = solve(samples::cube(0.5, [1.0; 6]), "m2");
+        let mut solver =
+            Solver::new(samples::cube(0.5, [1.0; 6]), Settings { error: 0.01, ..Settings::default() }).unwrap();
+        while solver.step().is_some() {}
+        let solution = solver.solution();
         let tone = ToneMap { exposure: 1.0, white: 1.0 };
         let model = lit_model(&solution, tone, None);
         // a furnace: B = 1 / (1 - 0.5) = 2 everywhere, whatever the element

@@ -5,11 +5,15 @@
 //! (`cell`) where the stiffness varies.
 
 mod cell;
+mod entries;
+mod hessian;
 mod line;
 mod operator;
 mod stencil;
 pub(crate) mod twofold;
 
+pub(crate) use cell::{CellMatrix, Classes, SpanClass};
+pub(crate) use hessian::Hessian;
 pub(crate) use operator::{Operator, Scratch};
 
 use crate::system::Space;

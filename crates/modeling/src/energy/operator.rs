@@ -15,11 +15,11 @@ pub(crate) struct Operator {
     pub(crate) lines: Vec<Line>,
     /// `(p, q, c)`: c times the squared norm of the p-th derivative in s and q-th in t (curves: p = 0).
     pub(crate) terms: Vec<(usize, usize, f64)>,
-    kind: Kind,
+    pub(super) kind: Kind,
 }
 
 #[derive(Clone, Debug)]
-enum Kind {
+pub(super) enum Kind {
     Uniform,
     /// Curves: the energies multiplied out, and the weighted Gram matrices.
     WeightedLine(Vec<(usize, f64, Stencil)>, Stencil),
@@ -38,6 +38,13 @@ pub(crate) struct Scratch {
     a: Vec<f64>,
     b: Vec<f64>,
     c: Vec<f64>,
+}
+
+impl Scratch {
+    /// Two buffers of the given length, contents undefined.
+    pub(crate) fn pair(&mut self, n: usize) -> (&mut [f64], &mut [f64]) {
+        (sized(&mut self.a, n), sized(&mut self.b, n))
+    }
 }
 
 fn sized(v: &mut Vec<f64>, n: usize) -> &mut [f64] {
@@ -251,7 +258,7 @@ impl Operator {
         }
     }
 
-    fn each_cell(&self, s: &Classes, t: &Classes, mut f: impl FnMut(usize, usize, &[usize; 16])) {
+    pub(super) fn each_cell(&self, s: &Classes, t: &Classes, mut f: impl FnMut(usize, usize, &[usize; 16])) {
         let width = self.shape[1];
         let mut cell = 0;
         for (is, cs) in s.index.iter().zip(&s.of) {
@@ -272,78 +279,6 @@ impl Operator {
                 y[*i] += factors[cell] * v;
             }
         });
-    }
-
-    /// All entries of the lower triangle (row >= column), each position possibly more than once.
-    pub(crate) fn entries(&self, mut put: impl FnMut(usize, usize, f64)) {
-        match &self.kind {
-            Kind::Cells { s, t, matrices, factors } => {
-                let dense: Vec<Vec<f64>> = matrices.iter().map(CellMatrix::dense).collect();
-                self.each_cell(s, t, |cell, m, local| {
-                    for (a, i) in local.iter().enumerate() {
-                        for (b, j) in local.iter().enumerate() {
-                            if i >= j {
-                                put(*i, *j, factors[cell] * dense[m][a * 16 + b]);
-                            }
-                        }
-                    }
-                });
-            }
-            Kind::WeightedLine(_, h) => {
-                for (r, row) in h.to_rows().into_iter().enumerate() {
-                    row.into_iter().filter(|e| e.0 <= r).for_each(|(c, v)| put(r, c, v));
-                }
-            }
-            Kind::Uniform if self.lines.len() == 1 => {
-                for &(_, q, c) in &self.terms {
-                    for (r, row) in self.lines[0].energy[q].to_rows().into_iter().enumerate() {
-                        row.into_iter().filter(|e| e.0 <= r).for_each(|(k, v)| put(r, k, c * v));
-                    }
-                }
-            }
-            Kind::Uniform => {
-                let width = self.shape[1];
-                for &(p, q, c) in &self.terms {
-                    let (s, t) = (self.lines[0].energy[p].to_rows(), self.lines[1].energy[q].to_rows());
-                    for (i, si) in s.iter().enumerate() {
-                        for (k, a) in si.iter().filter(|e| e.0 <= i) {
-                            for (j, tj) in t.iter().enumerate() {
-                                for (l, b) in tj {
-                                    let (row, col) = (i * width + j, k * width + l);
-                                    if row >= col {
-                                        put(row, col, c * a * b);
-                                    }
-                                }
-                            }
-                        }
-                    }
-                }
-            }
-        }
-    }
-
-    /// The diagonal of H.
-    pub(crate) fn diagonal(&self) -> Vec<f64> {
-        let mut out = vec![0.0; self.len()];
-        if let (Kind::Uniform, [s, t]) = (&self.kind, &self.lines[..]) {
-            let of = |line: &Line, a: usize| -> Vec<f64> {
-                let rows = line.energy[a].to_rows();
-                rows.iter().enumerate().map(|(r, row)| row.iter().filter(|e| e.0 == r).map(|e| e.1).sum()).collect()
-            };
-            for &(p, q, c) in &self.terms {
-                let (ds, dt) = (of(s, p), of(t, q));
-                for (row, a) in out.chunks_exact_mut(self.shape[1]).zip(&ds) {
-                    row.iter_mut().zip(&dt).for_each(|(o, b)| *o += c * a * b);
-                }
-            }
-        } else {
-            self.entries(|r, c, v| {
-                if r == c {
-                    out[r] += v;
-                }
-            });
-        }
-        out
     }
 
     /// A basis of the functions that cost nothing, coefficient by coefficient: polynomials of total degree below

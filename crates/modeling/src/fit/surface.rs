@@ -9,7 +9,7 @@ use super::normal::Normal;
 use crate::axis::{Axis, AxisError};
 use crate::basis;
 use crate::energy::{Energy, EnergyError, Operator};
-use crate::solve::multigrid::Cycle;
+use crate::solve::cycle::Cycle;
 use crate::system::Space;
 use ondelette_numerics::seed;
 use ondelette_wavelet::Boundary;

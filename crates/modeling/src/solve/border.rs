@@ -51,6 +51,32 @@ impl Border {
         Ok(border)
     }
 
+    /// The rows of S (packed, with the columns of Y) whose squared distance from the rows kept before them is above
+    /// `least[row]`, in the norm that the factor works in, and above rounding.
+    pub(crate) fn independent(s: &[f64], y: &[Vec<f64>], least: &[f64]) -> Vec<usize> {
+        let m = least.len();
+        let trace: f64 = (0..m).map(|i| s[start(i) + i]).sum();
+        let norm: f64 = y.iter().map(|y| dot(y, y)).sum();
+        let tau = if norm > 0.0 { y.len() as f64 * trace / norm } else { 0.0 };
+        let mut kept: Vec<usize> = Vec::new();
+        let mut matrix: Vec<f64> = Vec::new();
+        let mut factor = Cholesky::default();
+        for i in 0..m {
+            let of = |j: usize| s[start(i) + j] + tau * y.iter().map(|y| y[i] * y[j]).sum::<f64>();
+            matrix.truncate(start(kept.len()));
+            matrix.extend(kept.iter().map(|j| of(*j)));
+            let own = of(i);
+            matrix.push(own);
+            let grown = factor.extend(&matrix, kept.len() + 1).is_ok();
+            if grown && factor.pivot(kept.len()).powi(2) > least[i].max(2e-16 * own) {
+                kept.push(i);
+            } else {
+                factor.truncate(kept.len());
+            }
+        }
+        kept
+    }
+
     fn finish(&mut self) {
         let k = self.k;
         self.u = self.y.clone();

@@ -1,6 +1,8 @@
-//! The multilevel preconditioner of Bramble, Pasciak and Xu: diagonals on every level, the coarsest level exactly.
+//! The multilevel preconditioner of Bramble, Pasciak and Xu: diagonals on every level, strips along open ends and the
+//! coarsest level exactly.
 
 use super::cholesky::{Cholesky, dot, start};
+use super::edges::Edges;
 use super::green::{Green, Inverse};
 use super::transfer::Transfer;
 use crate::constraint::Functional;
@@ -23,8 +25,9 @@ pub(crate) struct Bpx {
 #[derive(Clone, Debug)]
 struct Level {
     space: Space,
-    /// Inverse diagonal.
+    /// Inverse diagonal; 0 where a strip takes over.
     inverse: Vec<f64>,
+    edges: Edges,
 }
 
 /// Coefficients of the coarsest level that are worth a dense factor.
@@ -41,8 +44,10 @@ impl Bpx {
             if now.len() <= 25 {
                 break;
             }
-            let inverse = operator.diagonal().into_iter().map(|d| 1.0 / d).collect();
-            levels.push(Level { space: now, inverse });
+            let mut inverse: Vec<f64> = operator.diagonal().into_iter().map(|d| 1.0 / d).collect();
+            let edges = Edges::new(&now, &operator);
+            edges.take_over(&mut inverse);
+            levels.push(Level { space: now, inverse, edges });
             transfers.push(Transfer::new(&coarser));
             let cells: Vec<usize> = coarser.axes().iter().map(crate::axis::Axis::spans).collect();
             map = map.map(|m| m.coarser(if cells.len() == 2 { [cells[0], cells[1]] } else { [1, cells[0]] }));
@@ -104,6 +109,7 @@ impl Green for Bpx {
                 for ((g, r), d) in g.iter_mut().zip(r).zip(&self.levels[0].inverse) {
                     *g += r * d;
                 }
+                self.levels[0].edges.add(r, g);
             } else {
                 let mut out = std::mem::take(&mut self.residuals[i]);
                 let mut fine = vec![0.0; out.len()];
@@ -111,6 +117,7 @@ impl Green for Bpx {
                 for ((f, r), d) in fine.iter_mut().zip(&out).zip(&self.levels[i].inverse) {
                     *f += r * d;
                 }
+                self.levels[i].edges.add(&out, &mut fine);
                 std::mem::swap(&mut self.lift, &mut fine);
                 out.truncate(self.levels[i].space.len());
                 self.residuals[i] = out;
@@ -125,7 +132,7 @@ impl Green for Bpx {
         let mut sparse: Vec<Vec<(u32, f64)>> = vec![Vec::new(); m];
         for level in &self.levels {
             for (f, out) in functionals.iter().zip(&mut sparse) {
-                for (i, v) in f.on(&level.space).entries().filter(|e| e.1 != 0.0) {
+                for (i, v) in f.on(&level.space).entries().filter(|e| e.1 != 0.0 && level.inverse[e.0] != 0.0) {
                     out.push(((offset + i) as u32, v * level.inverse[i].sqrt()));
                 }
             }
@@ -149,6 +156,12 @@ impl Green for Bpx {
                 out.push(near + dot(&dense[i], &dense[j]));
             }
             sparse[i].iter().for_each(|&(at, _)| place[at as usize] = 0.0);
+        }
+        for level in &self.levels {
+            if !level.edges.is_empty() {
+                let there: Vec<Functional> = functionals.iter().map(|f| f.on(&level.space)).collect();
+                level.edges.between(&there, &mut out);
+            }
         }
         out
     }

@@ -59,6 +59,18 @@ impl std::fmt::Display for Method {
     }
 }
 
+/// The iterations that the thesis compares (7.2.1, 7.7), all on the squared saddle system.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Iteration {
+    /// Conjugate gradients.
+    #[default]
+    ConjugateGradients,
+    /// Steepest descent: the gradient itself, again and again.
+    SteepestDescent,
+    /// One unknown after the other; an iteration is a sweep.
+    GaussSeidel,
+}
+
 /// How exactly, and how long at most.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
@@ -72,8 +84,11 @@ pub struct Settings {
     pub refine: bool,
     /// Heights of wavelets, where they are used; `None`: the exact diagonal of the energy.
     pub scaling: Option<Scaling>,
-    /// Methods of the thesis: steepest descent in place of conjugate gradients.
-    pub steepest: bool,
+    /// Methods of the thesis: how they iterate.
+    pub iteration: Iteration,
+    /// Methods of the thesis: the matrix of the saddle system formed entry by entry (7.4.1), not applied by transforms
+    /// and stencils; for up to 5000 unknowns. Gauss-Seidel always forms it.
+    pub explicit: bool,
 }
 
 impl Default for Settings {
@@ -84,7 +99,8 @@ impl Default for Settings {
             most_iterations: 100_000,
             refine: true,
             scaling: None,
-            steepest: false,
+            iteration: Iteration::ConjugateGradients,
+            explicit: false,
         }
     }
 }

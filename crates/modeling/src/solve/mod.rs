@@ -3,17 +3,22 @@
 //! [`Solver`] refines: residual of the saddle system, one [`Method`]'s correction, again, until the shape no longer
 //! moves. Residuals of curves are computed with twice the precision, so that every method reaches the last digits.
 
+mod auto;
 mod banded;
 mod border;
 mod bpx;
 pub(crate) mod cholesky;
 mod correct;
 mod cosine;
+pub(crate) mod cycle;
+mod edges;
 mod green;
 mod method;
-pub(crate) mod multigrid;
+mod multigrid;
+mod oracle;
 mod projected;
 mod refine;
+mod response;
 mod solution;
 mod sparse;
 mod spectral;
@@ -21,6 +26,7 @@ mod thesis;
 mod transfer;
 mod wavelet;
 
-pub use method::{Method, MethodError, Settings};
+pub use method::{Iteration, Method, MethodError, Settings};
+pub use oracle::{Oracle, Round};
 pub use refine::{SolveError, Solver, Step};
 pub use solution::{Residual, Solution};

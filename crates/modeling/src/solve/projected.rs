@@ -8,14 +8,14 @@ use super::border::Border;
 use super::cholesky::{dot, start};
 use super::correct::Correct;
 use super::green::{Green, Inverse};
-use crate::energy::{Operator, Scratch};
+use crate::energy::{Hessian, Scratch};
 use crate::system::Structure;
 use std::sync::Arc;
 
 /// The solver of one structure. Vectors hold the unknowns and, behind them, the misses u of the soft rows: unknowns of
 /// their own with the energy w u^2 and the rows `A x - u = b`.
 pub(crate) struct Projected {
-    h: Arc<Operator>,
+    h: Arc<dyn Hessian>,
     structure: Arc<Structure>,
     green: Box<dyn Green>,
     border: Border,
@@ -92,7 +92,7 @@ pub(crate) fn schur(structure: &Structure, green: &mut dyn Green) -> Vec<f64> {
 impl Projected {
     /// An error names the row without a pivot.
     pub(crate) fn new(
-        h: Arc<Operator>,
+        h: Arc<dyn Hessian>,
         structure: Arc<Structure>,
         mut green: Box<dyn Green>,
         null: Arc<Vec<Vec<f64>>>,
@@ -112,6 +112,20 @@ impl Projected {
             }
         }
         let border = Border::new(s, m, y)?;
+        Ok(Projected::bordered(h, structure, green, null, border, tolerance, most))
+    }
+
+    /// The same with the matrix of the multipliers already factored.
+    pub(crate) fn bordered(
+        h: Arc<dyn Hessian>,
+        structure: Arc<Structure>,
+        green: Box<dyn Green>,
+        null: Arc<Vec<Vec<f64>>>,
+        border: Border,
+        tolerance: f64,
+        most: usize,
+    ) -> Projected {
+        let m = structure.rows();
         let soft: Vec<usize> = (0..m).filter(|r| structure.give[*r] > 0.0).collect();
         let mut free: Vec<Vec<f64>> = Vec::new();
         for w in &border.free {
@@ -125,8 +139,8 @@ impl Projected {
             z.iter_mut().for_each(|z| *z /= size);
             free.push(z);
         }
-        Ok(Projected {
-            trace: h.diagonal().iter().sum::<f64>() * structure.k as f64,
+        Projected {
+            trace: h.trace() * structure.k as f64,
             h,
             structure,
             green,
@@ -153,7 +167,12 @@ impl Projected {
             iterations: 0,
             pending: Pending::Nothing,
             scratch: Scratch::default(),
-        })
+        }
+    }
+
+    /// Iterates until the squared residual, in the preconditioner's norm, is below `goal`.
+    pub(crate) fn aim(&mut self, goal: f64) {
+        self.goal = goal;
     }
 
     fn len(&self) -> usize {
@@ -218,7 +237,7 @@ impl Projected {
         let (n, all) = (self.structure.n, self.structure.unknowns());
         self.hp.resize(self.p.len(), 0.0);
         for (x, y) in self.p[..all].chunks_exact(n).zip(self.hp[..all].chunks_exact_mut(n)) {
-            self.h.apply(x, y, &mut self.scratch);
+            self.h.times(x, y, &mut self.scratch);
         }
         for (i, row) in self.soft.iter().enumerate() {
             self.hp[all + i] = self.p[all + i] / self.structure.give[*row];
@@ -246,7 +265,7 @@ impl Projected {
         if self.goal == 0.0 {
             // On surfaces the rounding of the coefficients alone has about this energy.
             let size = self.x.iter().fold(0.0, |m: f64, v| m.max(v.abs())) * 1e-16;
-            let noise = if self.h.lines.len() == 2 { size * size * self.trace } else { 0.0 };
+            let noise = if self.h.is_surface() { size * size * self.trace } else { 0.0 };
             self.goal = (energy.max(self.rg) * self.tolerance * self.tolerance).max(noise);
         }
         self.finished()
@@ -325,6 +344,6 @@ impl Correct for Projected {
     }
 
     fn follows_multipliers(&self) -> bool {
-        self.green.inverse() == Inverse::Exact && self.h.lines.len() == 2
+        self.green.inverse() == Inverse::Exact && self.h.is_surface()
     }
 }

@@ -1,5 +1,6 @@
 //! The stepped solver: blocks one after another, each refined until it no longer moves.
 
+use super::auto::choose;
 use super::banded::{BandGreen, Banded};
 use super::bpx::Bpx;
 use super::correct::Correct;
@@ -14,8 +15,7 @@ use super::thesis::Squared;
 use super::wavelet::WaveletGreen;
 use crate::constraint::curvature;
 use crate::energy::{Operator, Scratch, twofold};
-use crate::system::{Block, Problem, ProblemError, Structure};
-use ondelette_wavelet::Boundary;
+use crate::system::{Block, Problem, ProblemError, Redundant, Structure};
 use std::sync::Arc;
 
 /// Why a problem cannot be solved.
@@ -76,23 +76,23 @@ pub struct Step {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Solver {
-    problem: Problem,
-    settings: Settings,
-    method: Method,
+    pub(super) problem: Problem,
+    pub(super) settings: Settings,
+    pub(super) method: Method,
     why: &'static str,
     h: Arc<Operator>,
-    blocks: Vec<(Arc<Structure>, Block)>,
+    pub(super) blocks: Vec<(Arc<Structure>, Block)>,
     notes: Vec<String>,
     /// One a block, kept for other targets.
     correctors: Vec<Option<Box<dyn Correct>>>,
-    at: (usize, usize),
+    pub(super) at: (usize, usize),
     /// Unknowns and multipliers of every side, block by block.
-    sides: Vec<Vec<SideState>>,
-    stage: Stage,
-    iterations: usize,
+    pub(super) sides: Vec<Vec<SideState>>,
+    pub(super) stage: Stage,
+    pub(super) iterations: usize,
     scratch: Scratch,
-    converged: bool,
-    newton: usize,
+    pub(super) converged: bool,
+    pub(super) newton: usize,
 }
 
 #[derive(Clone, Debug, Default)]
@@ -105,7 +105,7 @@ pub(crate) struct SideState {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Stage {
+pub(crate) enum Stage {
     Residual,
     Correct,
     Finished,
@@ -127,14 +127,7 @@ impl Solver {
         let (blocks, redundant) = problem.blocks(rows)?;
         let h = Arc::new(Operator::new(problem.space(), problem.energy(), problem.stiffness()));
         let (method, why) = choose(&problem, &h, settings.method)?;
-        let name = |c: &usize| problem.constraints()[*c].id.clone();
-        let notes = redundant
-            .iter()
-            .map(|r| {
-                let others: Vec<String> = r.others.iter().take(8).map(name).collect();
-                format!("constraint {} follows from {}: redundant", name(&r.constraint), others.join(", "))
-            })
-            .collect();
+        let notes = notes(&problem, &redundant);
         let sides = fresh_sides(&blocks);
         let blocks: Vec<(Arc<Structure>, Block)> =
             blocks.into_iter().map(|b| (Arc::new(b.structure.clone()), b)).collect();
@@ -196,7 +189,7 @@ impl Solver {
         Ok(())
     }
 
-    fn advance(&mut self) -> Result<Option<Step>, SolveError> {
+    pub(super) fn advance(&mut self) -> Result<Option<Step>, SolveError> {
         if self.stage == Stage::Finished {
             return Ok(None);
         }
@@ -365,8 +358,9 @@ impl Solver {
                     .map(|basis| basis.ok_or_else(|| unfit("the axes have no common pyramid")))
                     .transpose()?;
                 let tolerance = self.settings.tolerance * 1e-3;
-                let steepest = self.settings.steepest;
-                return Ok(Box::new(Squared::new(self.h.clone(), structure, basis, steepest, tolerance, most)));
+                let (iteration, explicit) = (self.settings.iteration, self.settings.explicit);
+                let solver = Squared::new(self.h.clone(), structure, basis, (iteration, explicit), tolerance, most);
+                return Ok(Box::new(solver.ok_or_else(|| unfit("explicit matrices are for up to 5000 unknowns"))?));
             }
             Method::Wavelet => {
                 let green = WaveletGreen::new(space, energy, &self.h, self.settings.scaling);
@@ -383,113 +377,11 @@ impl Solver {
         projected.map(|p| Box::new(p) as Box<dyn Correct>).map_err(degenerate)
     }
 
-    /// Takes other targets for the same constraints, keeping all factors; the next steps solve for them.
-    ///
-    /// # Errors
-    /// The problem differs in more than targets ([`SolveError::Method`] says so), or its constraints conflict.
-    pub fn retarget(&mut self, problem: Problem) -> Result<(), SolveError> {
-        let (blocks, _) = problem.blocks(problem.rows())?;
-        let same = blocks.len() == self.blocks.len()
-            && self.newton == 0
-            && blocks.iter().zip(&self.blocks).all(|(new, (old, block))| {
-                new.structure.terms == old.terms
-                    && new.structure.give == old.give
-                    && new.structure.functionals == old.functionals
-                    && new.sides.len() == block.sides.len()
-            })
-            && problem.space() == self.problem.space()
-            && problem.energy() == self.problem.energy()
-            && problem.stiffness() == self.problem.stiffness();
-        if !same {
-            return Err(SolveError::Method {
-                method: self.method,
-                why: "the problem differs in more than its targets",
-            });
-        }
-        self.sides = fresh_sides(&blocks);
-        for ((_, old), new) in self.blocks.iter_mut().zip(blocks) {
-            *old = new;
-        }
-        self.problem = problem;
-        self.at = (0, 0);
-        self.stage = Stage::Residual;
-        self.iterations = 0;
-        self.converged = true;
-        Ok(())
-    }
-
-    /// The Green column of a row: how the coefficients answer to one unit of its target, coordinate by coordinate.
-    ///
-    /// Rows are numbered as in [`Solution::residuals`], redundant ones left out by name. Costs one solution with the
-    /// factors at hand. `None` for redundant rows and for curvature.
-    ///
-    /// # Errors
-    /// [`SolveError::Degenerate`].
-    pub fn response(&mut self, constraint: &str, part: usize) -> Result<Option<Vec<(usize, Vec<f64>)>>, SolveError> {
-        let Some(number) = self.problem.constraints().iter().position(|c| c.id == constraint) else { return Ok(None) };
-        if self.newton > 0 {
-            return Ok(None);
-        }
-        // Rows of a constraint come in order, but each in the block of its coordinate.
-        let mut seen = 0;
-        let mut place = None;
-        let coordinates = self.problem.coordinates();
-        'search: for c in 0..coordinates {
-            for (b, (_, block)) in self.blocks.iter().enumerate() {
-                for (s, side) in block.sides.iter().enumerate().filter(|(_, s)| s.coordinates.first() == Some(&c)) {
-                    for r in (0..side.constraints.len()).filter(|r| side.constraints[*r] == number) {
-                        if seen == part {
-                            place = Some((b, s, r));
-                            break 'search;
-                        }
-                        seen += 1;
-                    }
-                }
-            }
-        }
-        let Some((b, s, r)) = place else { return Ok(None) };
-        let kept = (self.at, self.stage, self.iterations, self.converged);
-        let zero = {
-            let structure = &self.blocks[b].0;
-            let mut targets = vec![0.0; structure.rows()];
-            targets[r] = 1.0 / structure.lengths[r];
-            targets
-        };
-        let side = &mut self.blocks[b].1.sides[s];
-        let targets = std::mem::replace(&mut side.targets, zero);
-        let fresh = fresh_sides(std::slice::from_ref(&self.blocks[b].1)).pop().and_then(|mut s| s.pop());
-        let state = std::mem::replace(&mut self.sides[b][s], fresh.unwrap_or_default());
-        self.at = (b, s);
-        self.stage = Stage::Residual;
-        let mut outcome = Ok(());
-        while self.at == (b, s) && self.stage != Stage::Finished {
-            if let Err(e) = self.advance() {
-                outcome = Err(e);
-                break;
-            }
-        }
-        let column = std::mem::replace(&mut self.sides[b][s], state);
-        self.blocks[b].1.sides[s].targets = targets;
-        (self.at, self.stage, self.iterations, self.converged) = kept;
-        outcome?;
-        let n = self.problem.space().len();
-        let of = |(i, c): (usize, &usize)| (*c, column.x[i * n..][..n].to_vec());
-        Ok(Some(self.blocks[b].1.sides[s].coordinates.iter().enumerate().map(of).collect()))
-    }
-
     /// The solution so far.
     pub fn solution(&self) -> Solution {
         let problem = &self.problem;
         let coefficients = self.coefficients();
-        let mut residuals: Vec<Residual> = problem
-            .rows()
-            .iter()
-            .map(|row| {
-                let value: f64 = row.entries().map(|(c, i, v)| v * coefficients[c][i]).sum();
-                let id = problem.constraints()[row.constraint].id.clone();
-                Residual { id, soft: row.give > 0.0, miss: (value - row.target) * row.length }
-            })
-            .collect();
+        let mut residuals = Residual::all(problem, &problem.rows(), &coefficients);
         residuals.extend(curvature::rows(problem, &coefficients).misses);
         Solution::new(
             problem.space().clone(),
@@ -504,7 +396,17 @@ impl Solver {
     }
 }
 
-fn fresh_sides(blocks: &[Block]) -> Vec<Vec<SideState>> {
+/// What is said of redundant rows.
+pub(crate) fn notes(problem: &Problem, redundant: &[Redundant]) -> Vec<String> {
+    let name = |c: &usize| problem.constraints()[*c].id.clone();
+    let of = |r: &Redundant| {
+        let others: Vec<String> = r.others.iter().take(8).map(name).collect();
+        format!("constraint {} follows from {}: redundant", name(&r.constraint), others.join(", "))
+    };
+    redundant.iter().map(of).collect()
+}
+
+pub(crate) fn fresh_sides(blocks: &[Block]) -> Vec<Vec<SideState>> {
     let of = |b: &Block| {
         let one = |_| SideState {
             x: vec![0.0; b.structure.unknowns()],
@@ -520,23 +422,6 @@ fn fresh_sides(blocks: &[Block]) -> Vec<Vec<SideState>> {
 
 /// Newton steps after which curvature constraints are given up.
 const NEWTON: usize = 40;
-
-/// The rule of [`Method::Auto`], and what each method needs.
-fn choose(problem: &Problem, h: &Operator, asked: Method) -> Result<(Method, &'static str), SolveError> {
-    let axes = problem.space().axes();
-    let waves = h.is_uniform() && axes.iter().all(|a| a.boundary() != Boundary::Open);
-    let unfit = |why| Err(SolveError::Method { method: asked, why });
-    match asked {
-        Method::Auto if waves && !problem.space().is_curve() => {
-            Ok((Method::Spectral, "mirrored or periodic axes of uniform stiffness"))
-        }
-        Method::Auto if problem.space().is_curve() => Ok((Method::Banded, "a curve")),
-        Method::Auto => Ok((Method::Bpx, "open axes or varying stiffness")),
-        Method::Banded if !problem.space().is_curve() => unfit("it is for curves"),
-        Method::Spectral if !waves => unfit("it needs mirrored or periodic axes and uniform stiffness"),
-        method => Ok((method, "asked for")),
-    }
-}
 
 /// What is left of both equations.
 fn residual(

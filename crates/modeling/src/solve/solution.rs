@@ -2,8 +2,9 @@
 
 use super::method::Method;
 use crate::basis;
+use crate::constraint::Row;
 use crate::energy::Operator;
-use crate::system::Space;
+use crate::system::{Problem, Space};
 use std::sync::Arc;
 
 /// How far a constraint row is missed.
@@ -28,6 +29,19 @@ pub struct Solution {
     iterations: usize,
     converged: bool,
     notes: Vec<String>,
+    adapted: Option<(usize, f64)>,
+}
+
+impl Residual {
+    /// The misses of rows, in their order.
+    pub(crate) fn all(problem: &Problem, rows: &[Row], coefficients: &[Vec<f64>]) -> Vec<Residual> {
+        let of = |row: &Row| {
+            let value: f64 = row.entries().map(|(c, i, v)| v * coefficients[c][i]).sum();
+            let id = problem.constraints()[row.constraint].id.clone();
+            Residual { id, soft: row.give > 0.0, miss: (value - row.target) * row.length }
+        };
+        rows.iter().map(of).collect()
+    }
 }
 
 impl Solution {
@@ -42,7 +56,23 @@ impl Solution {
         converged: bool,
         notes: Vec<String>,
     ) -> Solution {
-        Solution { space, coefficients, h, residuals, method, iterations, converged, notes }
+        Solution { space, coefficients, h, residuals, method, iterations, converged, notes, adapted: None }
+    }
+
+    /// The same, found on some of the functions only, with an estimate of its energy above the least.
+    pub(crate) fn adapted(mut self, active: usize, excess: f64) -> Solution {
+        self.adapted = Some((active, excess));
+        self
+    }
+
+    /// Of adaptive solutions: how many functions a coordinate needed; all others are zero (data reduction, 7.10).
+    pub fn active(&self) -> Option<usize> {
+        self.adapted.map(|a| a.0)
+    }
+
+    /// Of adaptive solutions: an estimate of the energy above that of all functions together, in domain units.
+    pub fn excess(&self) -> Option<f64> {
+        self.adapted.map(|a| a.1)
     }
 
     /// Where the coefficients live.

@@ -1,9 +1,10 @@
-//! The iteration of the thesis (7.2.4, 7.3): conjugate gradients or steepest descent on the squared saddle system
-//! M^T M, in B-splines or in wavelets. Implicit: M is applied, never formed. For comparison; the square of M is what
-//! makes it slow.
+//! The iterations of the thesis (7.2.1, 7.3, 7.4.1): conjugate gradients, steepest descent or Gauss-Seidel on the
+//! squared saddle system M^T M, in B-splines or in wavelets. Implicit: M is applied by transforms and stencils;
+//! explicit: its entries are formed. For comparison; the square of M is what makes it slow.
 
 use super::cholesky::dot;
 use super::correct::Correct;
+use super::method::Iteration;
 use super::wavelet::WaveletGreen;
 use crate::energy::{Operator, Scratch};
 use crate::system::Structure;
@@ -15,7 +16,9 @@ pub(crate) struct Squared {
     structure: Arc<Structure>,
     /// Wavelets, if they are the unknowns.
     basis: Option<WaveletGreen>,
-    steepest: bool,
+    iteration: Iteration,
+    /// The columns of M with their squared lengths, where they are formed.
+    columns: Option<Vec<Column>>,
     /// What rows are multiplied by, against H: the thesis does not state it.
     scale: f64,
     tolerance: f64,
@@ -33,25 +36,41 @@ pub(crate) struct Squared {
     scratch: Scratch,
 }
 
+/// Entries of a column of M, and the sum of their squares.
+struct Column {
+    entries: Vec<(u32, f64)>,
+    square: f64,
+}
+
+/// Unknowns for which M is formed at most: in wavelets it has up to their square of entries.
+const EXPLICIT: usize = 5000;
+
 impl Squared {
-    /// Takes the saddle system of a structure.
+    /// Takes the saddle system of a structure; `how` iterates, and on a formed matrix or not. `None` where the matrix
+    /// would be too large to form.
     pub(crate) fn new(
         h: Arc<Operator>,
         structure: Arc<Structure>,
         basis: Option<WaveletGreen>,
-        steepest: bool,
+        how: (Iteration, bool),
         tolerance: f64,
         most: usize,
-    ) -> Squared {
+    ) -> Option<Squared> {
+        let explicit = how.1 || how.0 == Iteration::GaussSeidel;
+        let all = structure.unknowns() + structure.rows();
+        if explicit && all > EXPLICIT {
+            return None;
+        }
         let size = h.diagonal().into_iter().fold(0.0, f64::max);
         let l = vec![0.0; structure.rows()];
         // In wavelets of unit energy H has the size 1.
         let scale = if basis.is_some() { 10.0 } else { 10.0 * size };
-        Squared {
+        let mut out = Squared {
             h,
             structure,
             basis,
-            steepest,
+            iteration: how.0,
+            columns: None,
             scale,
             tolerance,
             most,
@@ -66,11 +85,38 @@ impl Squared {
             x: Vec::new(),
             l,
             scratch: Scratch::default(),
+        };
+        if explicit {
+            let mut unit = vec![0.0; all];
+            let mut column = Vec::new();
+            let mut columns = Vec::with_capacity(all);
+            for i in 0..all {
+                unit[i] = 1.0;
+                out.times(&unit, &mut column);
+                unit[i] = 0.0;
+                // Transforms leave rounding where functions do not meet.
+                let least = 1e-15 * column.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+                let entries = column.iter().enumerate().filter(|e| e.1.abs() > least);
+                columns.push(Column {
+                    entries: entries.map(|(r, v)| (r as u32, *v)).collect(),
+                    square: dot(&column, &column),
+                });
+            }
+            out.columns = Some(columns);
         }
+        Some(out)
     }
 
     /// `out = M z`, M symmetric: unknowns in the basis, multipliers scaled.
     fn times(&mut self, z: &[f64], out: &mut Vec<f64>) {
+        if let Some(columns) = &self.columns {
+            out.clear();
+            out.resize(z.len(), 0.0);
+            for (column, z) in columns.iter().zip(z).filter(|c| *c.1 != 0.0) {
+                column.entries.iter().for_each(|(r, v)| out[*r as usize] += z * v);
+            }
+            return;
+        }
         let (n, all) = (self.structure.n, self.structure.unknowns());
         let (w, l) = z.split_at(all);
         let x = self.to_splines(w);
@@ -102,6 +148,26 @@ impl Squared {
         }
     }
 
+    /// A sweep of Gauss-Seidel on M^T M: each unknown in turn makes the residual orthogonal to its column.
+    fn sweep(&mut self) -> bool {
+        for (column, z) in self.columns.iter().flatten().zip(&mut self.z).filter(|c| c.0.square > 0.0) {
+            let product: f64 = column.entries.iter().map(|(r, v)| v * self.r[*r as usize]).sum();
+            let by = product / column.square;
+            *z += by;
+            column.entries.iter().for_each(|(r, v)| self.r[*r as usize] -= by * v);
+        }
+        self.iterations += 1;
+        self.ended(false)
+    }
+
+    fn ended(&mut self, stuck: bool) -> bool {
+        let done = stuck || dot(&self.r, &self.r) <= self.goal || self.iterations >= self.most;
+        if done {
+            self.publish();
+        }
+        done
+    }
+
     fn publish(&mut self) {
         let all = self.structure.unknowns();
         self.x = self.to_splines(&self.z[..all]);
@@ -126,6 +192,9 @@ impl Correct for Squared {
     }
 
     fn step(&mut self) -> bool {
+        if self.iteration == Iteration::GaussSeidel {
+            return self.sweep();
+        }
         let p = std::mem::take(&mut self.p);
         let mut q = std::mem::take(&mut self.q);
         self.times(&p, &mut q);
@@ -142,17 +211,13 @@ impl Correct for Squared {
         self.r = r;
         let old = self.gamma;
         self.gamma = dot(&s, &s);
-        let beta = if self.steepest { 0.0 } else { self.gamma / old };
+        let beta = if self.iteration == Iteration::SteepestDescent { 0.0 } else { self.gamma / old };
         self.p = p;
         self.p.iter_mut().zip(&s).for_each(|(p, s)| *p = s + beta * *p);
         self.s = s;
         self.q = q;
         self.iterations += 1;
-        let done = stuck || dot(&self.r, &self.r) <= self.goal || self.iterations >= self.most;
-        if done {
-            self.publish();
-        }
-        done
+        self.ended(stuck)
     }
 
     fn correction(&self) -> (&[f64], &[f64]) {

@@ -6,12 +6,13 @@
 use super::bpx::dense_factor;
 use super::cholesky::{Cholesky, dot, start};
 use super::green::{Green, Inverse};
+use crate::axis::Axis;
 use crate::constraint::Functional;
 use crate::energy::{Energy, Operator};
 use crate::system::Space;
 use ondelette_wavelet::{
-    Boundary, Decomposition, Family, Kind, Layout, OpenColumns, Part, Pyramid, Scaling, Sparse, SplineFamily, Tensor,
-    energy_diagonals, levels_allowed,
+    Boundary, Decomposition, EnergyDiagonals, Family, Kind, Layout, OpenColumns, Part, Pyramid, Scaling, Sparse,
+    SplineFamily, Tensor, energy_diagonals, levels_allowed,
 };
 
 /// P = W^-1 D^-1 W^-T.
@@ -26,43 +27,56 @@ pub(crate) struct WaveletGreen {
     heights: Vec<f64>,
 }
 
+/// The spaces of the common pyramid of the axes, finest first, and a pyramid an axis: bi-orthogonal cubic wavelets, on
+/// open axes semi-orthogonal ones. `None` where the axes have none, or its coarsest level is too large.
+pub(crate) fn pyramids(space: &Space) -> Option<(Vec<Space>, Vec<Pyramid>)> {
+    let family = Family::Spline(SplineFamily::CUBIC);
+    let mut spaces = vec![space.clone()];
+    let least = |a: &Axis| a.spans() > if a.boundary() == Boundary::Open { 8 } else { 4 };
+    let mut now = space.clone();
+    while let Some(coarser) = now.coarser().filter(|_| now.axes().iter().all(least)) {
+        let deep = spaces.len() - 1;
+        let fits = |a: &Axis| levels_allowed(family, a.boundary(), a.len()).is_ok_and(|most| deep < most);
+        if !space.axes().iter().all(fits) {
+            break;
+        }
+        spaces.push(coarser.clone());
+        now = coarser;
+    }
+    let levels = spaces.len() - 1;
+    if levels == 0 || now.len() > 2000 {
+        return None;
+    }
+    let pyramid = |a: &Axis| match a.boundary() {
+        Boundary::Open => Pyramid::open(a.len(), levels, OpenColumns::Unit).ok(),
+        b => Pyramid::new(family, b, a.len(), levels).ok(),
+    };
+    let axes = space.axes().iter().map(pyramid).collect::<Option<_>>()?;
+    Some((spaces, axes))
+}
+
+/// Energies of the functions of each axis, derivative by derivative (orders 0 to 3), in knot units of the finest level.
+pub(crate) fn diagonals(axes: &[Pyramid], h: &Operator) -> Vec<Vec<EnergyDiagonals>> {
+    axes.iter()
+        .zip(&h.lines)
+        .map(|(p, line)| {
+            let of = |a: usize| {
+                let rows = line.energy[a].to_rows().into_iter().enumerate();
+                let entries = rows.flat_map(|(r, row)| row.into_iter().map(move |(c, v)| (r, c, v)));
+                energy_diagonals(p, &Sparse::from_triplets(line.n, line.n, entries.collect()))
+            };
+            (0..4).map(of).collect()
+        })
+        .collect()
+}
+
 impl WaveletGreen {
     /// `scaling`: `None` takes the exact diagonal, else functions of these heights count as of unit energy.
     /// `None` where the axes have no common pyramid, or its coarsest level is too large.
     pub(crate) fn new(space: &Space, energy: &Energy, h: &Operator, scaling: Option<Scaling>) -> Option<WaveletGreen> {
-        let family = Family::Spline(SplineFamily::CUBIC);
-        let mut now = space.clone();
-        let mut levels = 0;
-        let least = |a: &crate::axis::Axis| a.spans() > if a.boundary() == Boundary::Open { 8 } else { 4 };
-        while let Some(coarser) = now.coarser().filter(|_| now.axes().iter().all(least)) {
-            let fits =
-                |a: &crate::axis::Axis| levels_allowed(family, a.boundary(), a.len()).is_ok_and(|most| levels < most);
-            if !space.axes().iter().all(fits) {
-                break;
-            }
-            now = coarser;
-            levels += 1;
-        }
-        if levels == 0 || now.len() > 2000 {
-            return None;
-        }
-        let pyramid = |a: &crate::axis::Axis| match a.boundary() {
-            Boundary::Open => Pyramid::open(a.len(), levels, OpenColumns::Unit).ok(),
-            b => Pyramid::new(family, b, a.len(), levels).ok(),
-        };
-        let axes: Vec<Pyramid> = space.axes().iter().map(pyramid).collect::<Option<_>>()?;
-        let diagonals: Vec<Vec<_>> = axes
-            .iter()
-            .zip(&h.lines)
-            .map(|(p, line)| {
-                let of = |a: usize| {
-                    let rows = line.energy[a].to_rows().into_iter().enumerate();
-                    let entries = rows.flat_map(|(r, row)| row.into_iter().map(move |(c, v)| (r, c, v)));
-                    energy_diagonals(p, &Sparse::from_triplets(line.n, line.n, entries.collect()))
-                };
-                (0..4).map(of).collect()
-            })
-            .collect();
+        let (spaces, axes) = pyramids(space)?;
+        let (levels, now) = (spaces.len() - 1, spaces.last()?.clone());
+        let diagonals = diagonals(&axes, h);
         let tensor = Tensor::new(axes, Layout::NonStandard).ok()?;
         let of = |axis: usize, a: usize, part: Part, j: usize| match part {
             Part::Smooth(i) => diagonals[axis][a].smooth[i][j],

@@ -66,20 +66,39 @@ impl Structure {
                 });
                 terms.push((local(t.coordinate), at, t.factor));
             }
-            let mut entries: Vec<(u32, f64)> =
-                row.entries().map(|(c, i, v)| ((local(c) * n + i) as u32, v)).filter(|e| e.1 != 0.0).collect();
-            entries.sort_by_key(|e| e.0);
-            entries.dedup_by(|later, first| {
-                let same = later.0 == first.0;
-                if same {
-                    first.1 += later.1;
-                }
-                same
-            });
-            out.columns.extend(entries.iter().map(|e| e.0));
-            out.values.extend(entries.iter().map(|e| e.1));
-            out.starts.push(out.columns.len());
+            out.push(merged(row.entries().map(|(c, i, v)| ((local(c) * n + i) as u32, v)).collect()));
             out.terms.push(terms);
+        }
+        out
+    }
+
+    fn push(&mut self, entries: Vec<(u32, f64)>) {
+        let entries = entries.into_iter().filter(|e| e.1 != 0.0);
+        for (column, value) in entries {
+            self.columns.push(column);
+            self.values.push(value);
+        }
+        self.starts.push(self.columns.len());
+    }
+
+    /// The rows `kept` over `n` other unknowns a coordinate, on which the functionals have the values of `lists`.
+    pub(crate) fn over(&self, n: usize, lists: &[Vec<(u32, f64)>], kept: &[usize]) -> Structure {
+        let of = |all: &[f64]| kept.iter().map(|r| all[*r]).collect();
+        let mut out = Structure {
+            n,
+            k: self.k,
+            functionals: self.functionals.clone(),
+            terms: kept.iter().map(|r| self.terms[*r].clone()).collect(),
+            give: of(&self.give),
+            lengths: of(&self.lengths),
+            starts: vec![0],
+            columns: Vec::new(),
+            values: Vec::new(),
+        };
+        for r in kept {
+            let part =
+                |&(c, f, by): &(usize, usize, f64)| lists[f].iter().map(move |(i, v)| ((c * n) as u32 + i, by * v));
+            out.push(merged(self.terms[*r].iter().flat_map(part).collect()));
         }
         out
     }
@@ -228,6 +247,19 @@ impl Problem {
         }
         Ok(rows.iter().zip(drop).filter(|(_, d)| !d).map(|(r, _)| r.clone()).collect())
     }
+}
+
+/// Entries sorted by column, those of one column added.
+pub(crate) fn merged<I: Copy + Ord>(mut entries: Vec<(I, f64)>) -> Vec<(I, f64)> {
+    entries.sort_by_key(|e| e.0);
+    entries.dedup_by(|later, first| {
+        let same = later.0 == first.0;
+        if same {
+            first.1 += later.1;
+        }
+        same
+    });
+    entries
 }
 
 /// True where the rows differ in nothing but targets and the coordinate they belong to.

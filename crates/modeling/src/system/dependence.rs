@@ -4,6 +4,7 @@
 //! factored row by row. A row (of length 1) whose distance from the span of its predecessors is below 1e-6 is
 //! taken as dependent.
 
+use super::block::merged;
 use crate::constraint::Row;
 use crate::solve::cholesky::{Cholesky, start};
 
@@ -55,21 +56,8 @@ pub(crate) fn dependent(rows: &[Row], n: usize, local: &dyn Fn(usize) -> usize) 
 }
 
 fn within(piece: &[usize], rows: &[Row], n: usize, local: &dyn Fn(usize) -> usize, out: &mut Vec<Dependence>) {
-    let sparse: Vec<Vec<(usize, f64)>> = piece
-        .iter()
-        .map(|r| {
-            let mut entries: Vec<(usize, f64)> = rows[*r].entries().map(|(c, i, v)| (local(c) * n + i, v)).collect();
-            entries.sort_by_key(|e| e.0);
-            entries.dedup_by(|b, a| {
-                let same = a.0 == b.0;
-                if same {
-                    a.1 += b.1;
-                }
-                same
-            });
-            entries
-        })
-        .collect();
+    let sparse: Vec<Vec<(usize, f64)>> =
+        piece.iter().map(|r| merged(rows[*r].entries().map(|(c, i, v)| (local(c) * n + i, v)).collect())).collect();
     let mut kept: Vec<usize> = Vec::new();
     let mut gram: Vec<f64> = Vec::new();
     let mut factor = Cholesky::default();

@@ -1,0 +1,437 @@
+//! The adaptive oracle (thesis 7.5): solves in as few wavelets as an energy bound allows.
+//!
+//! Top-down from the coarsest B-splines. A round solves on the active functions; then functions of negligible
+//! coefficient are put to sleep (dormant), and functions that would gain energy wake: near constraints that the active
+//! functions cannot meet, and children and neighbours of active functions of some size, the most gainful first. The
+//! thesis wakes all children of large coefficients; here the gain of a function decides, the squared residual against
+//! it (of unit energy), which is what it would save alone. When the gains promise less than the bound, all dormant
+//! functions are asked once more (revival). At last the smallest coefficients are dropped as far as the bound allows.
+//!
+//! It cannot cycle: a function that was put to sleep twice is never put to sleep again, so every function wakes at most
+//! three times, and every round wakes or drops something or is the last of its phase.
+
+mod active;
+mod cover;
+mod hierarchy;
+mod values;
+
+use super::method::Method;
+use super::refine::{SolveError, notes};
+use super::solution::{Residual, Solution};
+use crate::constraint::Demand;
+use crate::energy::Operator;
+use crate::system::Problem;
+use active::{Active, Gains, Saved, Solved};
+use hierarchy::{Function, Hierarchy};
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+/// What a round did.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Round {
+    /// Active functions of a coordinate.
+    pub active: usize,
+    /// B-splines that the active functions are made of (thesis 7.6).
+    pub cover: usize,
+    /// Energy of the solution, in domain units, with that of soft constraints.
+    pub energy: f64,
+    /// Estimated energy above that of all functions together; not known (infinite) while constraints are unmet and in
+    /// rounds that drop functions.
+    pub excess: f64,
+    /// Constraint rows that the active functions cannot meet yet.
+    pub unmet: usize,
+    /// Iterations so far.
+    pub iterations: usize,
+    /// A number for the state of the oracle: the active set and all marks. No state comes twice.
+    pub state: u64,
+}
+
+/// The oracle of one problem, stepped by its caller: between rounds its solution is valid, if unfinished.
+///
+/// ```
+/// use ondelette_modeling::constraint::{Constraint, Demand};
+/// use ondelette_modeling::energy::Energy;
+/// use ondelette_modeling::solve::Oracle;
+/// use ondelette_modeling::system::{Problem, Space};
+/// use ondelette_modeling::Axis;
+/// use ondelette_wavelet::Boundary;
+/// let axis = Axis::new(Boundary::Mirrored, 256, [0.0, 1.0])?;
+/// let point = |t: f64, y: f64| Constraint::new(format!("at {t}"), &[t], Demand::Position(vec![Some(y)]));
+/// let points = vec![point(0.0, 0.0), point(0.4, 1.0), point(1.0, 0.5)];
+/// let problem = Problem::new(Space::curve(axis), 1, Energy::BEND, None, points)?;
+/// let solution = Oracle::new(problem, 1e-3)?.run()?;
+/// assert!(solution.active().is_some_and(|n| n < 60));
+/// assert!(solution.residuals().iter().all(|r| r.miss.abs() < 1e-10));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Oracle {
+    problem: Problem,
+    h: Arc<Operator>,
+    notes: Vec<String>,
+    active: Active,
+    bound: f64,
+    phase: Phase,
+    /// Functions that were put to sleep: how often, and whether they sleep now.
+    asleep: BTreeMap<Function, (u8, bool)>,
+    last: Solved,
+    excess: f64,
+    converged: bool,
+}
+
+enum Phase {
+    Grow,
+    Drop(Box<Dropping>),
+    Done,
+}
+
+/// Dropping by bisection.
+struct Dropping {
+    /// What is kept if nothing more can be dropped, and its solution.
+    kept: Saved,
+    solved: Solved,
+    /// The functions that may go, smallest coefficients first.
+    order: Vec<Function>,
+    /// How many of them are dispensable; how many are not; how many are tried next.
+    good: usize,
+    bad: usize,
+    next: usize,
+    trials: usize,
+    /// Energy and excess at the end of growth.
+    grown: (f64, f64),
+    /// The energy that may not be passed.
+    most: f64,
+}
+
+/// Energy above the optimum, over the sum of the gains: measured on random problems; see the tests.
+const REACH: f64 = 4.0;
+/// Share of the bound at which growth ends; the rest is for dropping.
+const GROWTH: f64 = 0.2;
+/// Share of what is left of the bound that dropping may use.
+const MARGIN: f64 = 0.9;
+/// Share of the gains that a round takes.
+const BULK: f64 = 0.8;
+/// Iterations a round.
+const ITERATIONS: usize = 100;
+/// Active functions whose squared coefficient is this share of the allowed energy, divided by their number, have
+/// children and neighbours.
+const COUNTS: f64 = 0.05;
+/// How often a function may be put to sleep.
+const SLEEPS: u8 = 2;
+/// Functions that a round wakes for an unmet row.
+const NEARBY: usize = 4;
+/// Trials of dropping.
+const TRIALS: usize = 6;
+
+impl Oracle {
+    /// Prepares an oracle that ends when the energy is within `bound` times itself of the least (an estimate from the
+    /// gains of the next functions, not a proof). Only mirrored, periodic or open axes whose spans halve often enough,
+    /// uniform stiffness, no curvature.
+    ///
+    /// # Errors
+    /// [`SolveError`]; [`SolveError::Tolerance`] for bounds outside 1e-12 to 1.
+    pub fn new(problem: Problem, bound: f64) -> Result<Oracle, SolveError> {
+        if !(1e-12..=1.0).contains(&bound) {
+            return Err(SolveError::Tolerance(bound));
+        }
+        let unfit = |why| SolveError::Method { method: Method::Wavelet, why };
+        if problem.stiffness().is_some_and(|s| !s.is_uniform()) {
+            return Err(unfit("an adaptive set of wavelets needs uniform stiffness"));
+        }
+        if problem.constraints().iter().any(|c| matches!(c.demand, Demand::Curvature(_))) {
+            return Err(unfit("an adaptive set of wavelets takes no curvature constraints"));
+        }
+        let (blocks, redundant) = problem.blocks(problem.rows())?;
+        let h = Arc::new(Operator::new(problem.space(), problem.energy(), None));
+        let none = || unfit("the axes have no common pyramid");
+        let hierarchy = Hierarchy::new(problem.space(), problem.energy(), &h).ok_or_else(none)?;
+        let notes = notes(&problem, &redundant);
+        let active = Active::new(&problem, hierarchy, blocks).ok_or_else(none)?;
+        Ok(Oracle {
+            problem,
+            h,
+            notes,
+            active,
+            bound,
+            phase: Phase::Grow,
+            asleep: BTreeMap::new(),
+            last: Solved::default(),
+            excess: f64::INFINITY,
+            converged: false,
+        })
+    }
+
+    /// Does one round; `None` when there is nothing left to do.
+    ///
+    /// # Errors
+    /// [`SolveError::Degenerate`]: rows that not even all functions tell apart.
+    pub fn step(&mut self) -> Result<Option<Round>, SolveError> {
+        match std::mem::replace(&mut self.phase, Phase::Done) {
+            Phase::Grow => self.grow()?,
+            Phase::Drop(dropping) => self.drop(dropping)?,
+            Phase::Done => return Ok(None),
+        }
+        Ok(Some(Round {
+            active: self.active.functions.len(),
+            cover: self.active.cover,
+            energy: self.last.energy,
+            excess: self.excess,
+            unmet: self.last.unmet,
+            iterations: self.active.iterations,
+            state: self.state(),
+        }))
+    }
+
+    /// Steps to the end.
+    ///
+    /// # Errors
+    /// As [`Oracle::step`].
+    pub fn run(mut self) -> Result<Solution, SolveError> {
+        while self.step()?.is_some() {}
+        Ok(self.solution())
+    }
+
+    /// Solves on the active functions to an energy error of about `share` of the bound.
+    fn solve(&mut self, share: f64) -> Result<(), SolveError> {
+        let goal = share * self.bound * self.last.energy;
+        let goal = if goal > 0.0 && goal.is_finite() { goal } else { f64::MIN_POSITIVE };
+        self.last = self.active.solve(goal, ITERATIONS).map_err(|constraint| self.degenerate(constraint))?;
+        Ok(())
+    }
+
+    fn degenerate(&self, constraint: usize) -> SolveError {
+        SolveError::Degenerate { id: self.problem.constraints()[constraint].id.clone() }
+    }
+
+    /// A round of growth: solve, put to sleep, wake.
+    fn grow(&mut self) -> Result<(), SolveError> {
+        self.solve(0.01)?;
+        self.excess = f64::INFINITY;
+        if self.last.unmet > 0 {
+            let woken = self.nearby();
+            if woken.is_empty() {
+                self.notes.push("rows that not even all functions can meet are left out".to_owned());
+                self.converged = false;
+                return Ok(());
+            }
+            self.change(&[], woken);
+            self.phase = Phase::Grow;
+            return Ok(());
+        }
+        let allowed = self.bound * self.last.energy;
+        let squares = self.active.squares();
+        let mut gains = self.active.gains(self.candidates(&squares, allowed));
+        let sum = |gains: &Gains| gains.functions.iter().map(|g| g.1).sum::<f64>();
+        if REACH * sum(&gains) <= GROWTH * allowed {
+            let pulls = self.active.pulls(&gains).functions.into_iter();
+            gains.functions.extend(pulls.filter(|g| !self.asleep.get(&g.0).is_some_and(|s| s.1)));
+        }
+        let sum = sum(&gains);
+        let mut gains = gains.functions;
+        gains.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        self.excess = REACH * sum;
+        let small = self.negligible(&squares, 0.01 * allowed);
+        if REACH * sum > GROWTH * allowed {
+            let mut left = BULK * sum;
+            let few = gains.iter().take_while(|g| {
+                let take = left > 0.0;
+                left -= g.1;
+                take && g.1 > 0.0
+            });
+            let woken: Vec<Function> = few.map(|g| g.0).collect();
+            if !woken.is_empty() {
+                self.change(&small, woken);
+                self.phase = Phase::Grow;
+                return Ok(());
+            }
+        }
+        if self.asleep.values().any(|s| s.1) {
+            // Revival: the dormant are asked once more, and who is not wanted stays where it is.
+            self.asleep.values_mut().for_each(|s| s.1 = false);
+            self.phase = Phase::Grow;
+            return Ok(());
+        }
+        self.converged = true;
+        let corner = self.active.corner();
+        let mut order: Vec<(f64, Function)> =
+            squares.iter().copied().zip(self.active.functions.iter().copied()).skip(corner).collect();
+        order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let budget = MARGIN * (allowed - self.excess).max(0.0);
+        // Coefficients of functions of unit energy: the sum of their squares is about the energy that dropping costs.
+        let count = |most: f64| {
+            let mut sum = 0.0;
+            let within = |o: &&(f64, Function)| {
+                sum += o.0;
+                sum <= most
+            };
+            order.iter().take_while(within).count()
+        };
+        let (next, bad) = (count(0.5 * budget), count(8.0 * budget) + 1);
+        self.phase = Phase::Drop(Box::new(Dropping {
+            kept: self.active.save(),
+            solved: self.last,
+            order: order.into_iter().map(|o| o.1).collect(),
+            good: 0,
+            bad,
+            next: next.max(1),
+            trials: 0,
+            grown: (self.last.energy, self.excess),
+            most: self.last.energy + budget,
+        }));
+        Ok(())
+    }
+
+    /// A trial of dropping; the last one leaves the best set.
+    fn drop(&mut self, mut d: Box<Dropping>) -> Result<(), SolveError> {
+        let over = d.next <= d.good || d.next >= d.bad || d.next > d.order.len();
+        if !over {
+            let gone: BTreeSet<Function> = d.order[..d.next].iter().copied().collect();
+            let rest = self.active.functions.iter().filter(|f| !gone.contains(f)).copied().collect();
+            self.active.replace(rest);
+            self.solve(1e-3)?;
+            d.trials += 1;
+            if self.last.unmet == 0 && self.last.energy <= d.most {
+                d.good = d.next;
+                (d.kept, d.solved) = (self.active.save(), self.last);
+            } else {
+                d.bad = d.next;
+                self.active.restore(d.kept.clone());
+                self.last = d.solved;
+            }
+            d.next = usize::midpoint(d.good, d.bad);
+        }
+        self.excess = d.grown.1 + self.last.energy - d.grown.0;
+        let close = d.bad - d.good <= 1 + d.order.len() / 100;
+        if !over && d.trials < TRIALS && !close {
+            self.phase = Phase::Drop(d);
+        }
+        Ok(())
+    }
+
+    /// Functions that may wake: near active ones whose squared coefficients count, on the same level and the next.
+    fn candidates(&self, squares: &[f64], allowed: f64) -> Vec<Function> {
+        let h = &self.active.hierarchy;
+        let enough = COUNTS * allowed / squares.len() as f64;
+        // Seats (coarse cells) by rise.
+        let mut seats: Vec<BTreeSet<(u32, u32)>> = vec![BTreeSet::new(); h.rises.len()];
+        let around = |level: usize, side: usize, seat: u32| -> std::ops::RangeInclusive<u32> {
+            let last = h.levels[level][side].spans as u32 - 1;
+            seat.saturating_sub(1)..=(seat + 1).min(last)
+        };
+        for (f, square) in self.active.functions.iter().zip(squares) {
+            let Some(r) = usize::from(f.rise).checked_sub(1) else { continue };
+            if *square < enough {
+                continue;
+            }
+            let (i, j) = (h.rises[r][0].centre[f.s as usize], h.rises[r][1].centre[f.t as usize]);
+            for a in around(r, 0, i) {
+                seats[r].extend(around(r, 1, j).map(|b| (a, b)));
+            }
+            if let Some(finer) = seats.get_mut(r + 1) {
+                let halves = if h.levels[r + 1][0].spans > h.levels[r][0].spans { 2 } else { 1 };
+                for a in 0..halves {
+                    finer.extend((0..2).map(|b| (halves * i + a, 2 * j + b)));
+                }
+            }
+        }
+        let [s, t] = &h.levels[0];
+        seats[0].extend((0..s.spans as u32).flat_map(|a| (0..t.spans as u32).map(move |b| (a, b))));
+        let mut out = Vec::new();
+        for (r, seats) in seats.iter().enumerate() {
+            let [rs, rt] = &h.rises[r];
+            for (a, b) in seats {
+                for i in &rs.seated[*a as usize] {
+                    for j in rt.seated[*b as usize].iter().filter(|j| !h.is_smooth(r, *i, **j)) {
+                        let f = Function { rise: r as u8 + 1, s: *i, t: *j };
+                        if !self.active.is_active(f) && !self.asleep.get(&f).is_some_and(|s| s.1) {
+                            out.push(f);
+                        }
+                    }
+                }
+            }
+        }
+        out
+    }
+
+    /// Active functions that hardly count and have not been put to sleep too often.
+    fn negligible(&self, squares: &[f64], allowed: f64) -> Vec<Function> {
+        let (corner, few) = (self.active.corner(), allowed / squares.len() as f64);
+        let all = self.active.functions.iter().zip(squares).skip(corner);
+        let small = all.filter(|(f, square)| **square < few && self.asleep.get(f).is_none_or(|s| s.0 < SLEEPS));
+        small.map(|(f, _)| *f).collect()
+    }
+
+    /// The inactive functions that see the unmet constraints best, a few a row.
+    fn nearby(&self) -> Vec<Function> {
+        let h = &self.active.hierarchy;
+        let mut out = BTreeSet::new();
+        for part in &self.active.parts {
+            for row in &part.left_out {
+                let mut seen: BTreeMap<Function, f64> = BTreeMap::new();
+                for &(_, f, by) in &part.structure.terms[*row] {
+                    for (f, v) in part.seen[f].all(h).filter(|e| !self.active.is_active(e.0)) {
+                        *seen.entry(f).or_default() += (by * v * h.height(f)).powi(2);
+                    }
+                }
+                let mut seen: Vec<(Function, f64)> = seen.into_iter().filter(|e| e.1 > 0.0).collect();
+                seen.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+                out.extend(seen.into_iter().take(NEARBY).map(|e| e.0));
+            }
+        }
+        out.into_iter().collect()
+    }
+
+    /// Puts functions to sleep and wakes others.
+    fn change(&mut self, sleep: &[Function], wake: Vec<Function>) {
+        for f in sleep {
+            let marks = self.asleep.entry(*f).or_default();
+            *marks = (marks.0 + 1, true);
+        }
+        for f in &wake {
+            if let Some(marks) = self.asleep.get_mut(f) {
+                marks.1 = false;
+            }
+        }
+        let gone: BTreeSet<&Function> = sleep.iter().collect();
+        let mut functions: Vec<Function> =
+            self.active.functions.iter().filter(|f| !gone.contains(f)).copied().chain(wake).collect();
+        functions.sort_unstable();
+        self.active.replace(functions);
+    }
+
+    fn state(&self) -> u64 {
+        // FNV-1a over everything that the next round depends on besides the numbers.
+        let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+        let mut put = |v: u64| hash = (hash ^ v).wrapping_mul(0x0100_0000_01b3);
+        let number = |f: &Function| u64::from(f.rise) << 56 | u64::from(f.s) << 28 | u64::from(f.t);
+        self.active.functions.iter().for_each(|f| put(number(f)));
+        for (f, marks) in &self.asleep {
+            put(number(f));
+            put(u64::from(marks.0) * 2 + u64::from(marks.1));
+        }
+        match &self.phase {
+            Phase::Grow => put(1),
+            Phase::Drop(d) => [2, d.good as u64, d.bad as u64].into_iter().for_each(put),
+            Phase::Done => put(3),
+        }
+        hash
+    }
+
+    /// The solution so far; its coefficients are those of the finest B-splines.
+    pub fn solution(&self) -> Solution {
+        let problem = &self.problem;
+        let coefficients = self.active.coefficients(problem.coordinates());
+        let residuals = Residual::all(problem, &problem.rows(), &coefficients);
+        let why = "asked for: an adaptive set of wavelets";
+        Solution::new(
+            problem.space().clone(),
+            coefficients,
+            self.h.clone(),
+            residuals,
+            (Method::Wavelet, why),
+            self.active.iterations,
+            self.converged && matches!(self.phase, Phase::Done),
+            self.notes.clone(),
+        )
+        .adapted(self.active.functions.len(), self.excess)
+    }
+}

@@ -1,0 +1,100 @@
+//! What a solver's factors are kept for: other targets of the same constraints, and the answer to one of them.
+
+use super::refine::{SolveError, Solver, Stage, fresh_sides};
+use crate::system::Problem;
+
+impl Solver {
+    /// Takes other targets for the same constraints, keeping all factors; the next steps solve for them.
+    ///
+    /// # Errors
+    /// The problem differs in more than targets ([`SolveError::Method`] says so), or its constraints conflict.
+    pub fn retarget(&mut self, problem: Problem) -> Result<(), SolveError> {
+        let (blocks, _) = problem.blocks(problem.rows())?;
+        let same = blocks.len() == self.blocks.len()
+            && self.newton == 0
+            && blocks.iter().zip(&self.blocks).all(|(new, (old, block))| {
+                new.structure.terms == old.terms
+                    && new.structure.give == old.give
+                    && new.structure.functionals == old.functionals
+                    && new.sides.len() == block.sides.len()
+            })
+            && problem.space() == self.problem.space()
+            && problem.energy() == self.problem.energy()
+            && problem.stiffness() == self.problem.stiffness();
+        if !same {
+            return Err(SolveError::Method {
+                method: self.method,
+                why: "the problem differs in more than its targets",
+            });
+        }
+        self.sides = fresh_sides(&blocks);
+        for ((_, old), new) in self.blocks.iter_mut().zip(blocks) {
+            *old = new;
+        }
+        self.problem = problem;
+        self.at = (0, 0);
+        self.stage = Stage::Residual;
+        self.iterations = 0;
+        self.converged = true;
+        Ok(())
+    }
+
+    /// The Green column of a row: how the coefficients answer to one unit of its target, coordinate by coordinate.
+    ///
+    /// Rows are numbered as in [`super::Solution::residuals`], redundant ones left out by name. Costs one solution with
+    /// the factors at hand. `None` for redundant rows and for curvature.
+    ///
+    /// # Errors
+    /// [`SolveError::Degenerate`].
+    pub fn response(&mut self, constraint: &str, part: usize) -> Result<Option<Vec<(usize, Vec<f64>)>>, SolveError> {
+        let Some(number) = self.problem.constraints().iter().position(|c| c.id == constraint) else { return Ok(None) };
+        if self.newton > 0 {
+            return Ok(None);
+        }
+        // Rows of a constraint come in order, but each in the block of its coordinate.
+        let mut seen = 0;
+        let mut place = None;
+        let coordinates = self.problem.coordinates();
+        'search: for c in 0..coordinates {
+            for (b, (_, block)) in self.blocks.iter().enumerate() {
+                for (s, side) in block.sides.iter().enumerate().filter(|(_, s)| s.coordinates.first() == Some(&c)) {
+                    for r in (0..side.constraints.len()).filter(|r| side.constraints[*r] == number) {
+                        if seen == part {
+                            place = Some((b, s, r));
+                            break 'search;
+                        }
+                        seen += 1;
+                    }
+                }
+            }
+        }
+        let Some((b, s, r)) = place else { return Ok(None) };
+        let kept = (self.at, self.stage, self.iterations, self.converged);
+        let zero = {
+            let structure = &self.blocks[b].0;
+            let mut targets = vec![0.0; structure.rows()];
+            targets[r] = 1.0 / structure.lengths[r];
+            targets
+        };
+        let side = &mut self.blocks[b].1.sides[s];
+        let targets = std::mem::replace(&mut side.targets, zero);
+        let fresh = fresh_sides(std::slice::from_ref(&self.blocks[b].1)).pop().and_then(|mut s| s.pop());
+        let state = std::mem::replace(&mut self.sides[b][s], fresh.unwrap_or_default());
+        self.at = (b, s);
+        self.stage = Stage::Residual;
+        let mut outcome = Ok(());
+        while self.at == (b, s) && self.stage != Stage::Finished {
+            if let Err(e) = self.advance() {
+                outcome = Err(e);
+                break;
+            }
+        }
+        let column = std::mem::replace(&mut self.sides[b][s], state);
+        self.blocks[b].1.sides[s].targets = targets;
+        (self.at, self.stage, self.iterations, self.converged) = kept;
+        outcome?;
+        let n = self.problem.space().len();
+        let of = |(i, c): (usize, &usize)| (*c, column.x[i * n..][..n].to_vec());
+        Ok(Some(self.blocks[b].1.sides[s].coordinates.iter().enumerate().map(of).collect()))
+    }
+}

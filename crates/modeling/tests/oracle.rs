@@ -1,0 +1,113 @@
+//! The adaptive oracle against full solutions: sizes, energies, and that it ends.
+
+mod random;
+
+use ondelette_modeling::Axis;
+use ondelette_modeling::constraint::{Constraint, Demand};
+use ondelette_modeling::energy::Energy;
+use ondelette_modeling::solve::{Oracle, Round, Settings, Solution, SolveError, Solver};
+use ondelette_modeling::system::{Problem, Space};
+use ondelette_wavelet::Boundary;
+use serde_json::Value;
+use std::collections::BTreeSet;
+
+fn numbers(v: &Value) -> Vec<f64> {
+    v.as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()
+}
+
+fn stepped(problem: &Problem, bound: f64) -> Result<(Vec<Round>, Solution), SolveError> {
+    let mut oracle = Oracle::new(problem.clone(), bound)?;
+    let mut rounds = Vec::new();
+    while let Some(round) = oracle.step()? {
+        rounds.push(round);
+    }
+    Ok((rounds, oracle.solution()))
+}
+
+#[test]
+fn few_functions_come_within_a_thousandth_of_the_least_energy() {
+    let vectors: Value = serde_json::from_str(include_str!("data/adaptive.json")).unwrap();
+    for (entry, most) in vectors["problems"].as_array().unwrap().iter().zip([100, 400, 640]) {
+        let axis = Axis::new(Boundary::Mirrored, 32, [0.0, 32.0]).unwrap();
+        let points: Vec<f64> = entry["pts"].as_array().unwrap().iter().flat_map(numbers).collect();
+        let point = |(i, (at, b)): (usize, (&[f64], &f64))| {
+            Constraint::new(format!("{i}"), at, Demand::Position(vec![Some(*b)]))
+        };
+        let rows = points.chunks(2).zip(&numbers(&entry["b"])).enumerate().map(point).collect();
+        let problem = Problem::new(Space::surface(axis, axis), 1, Energy::BEND, None, rows).unwrap();
+        let (_, solution) = stepped(&problem, 1e-3).unwrap();
+        let (name, energy) = (&entry["name"], entry["energy"].as_f64().unwrap());
+        let (active, over) = (solution.active().unwrap(), solution.energy() / energy - 1.0);
+        assert!(solution.converged(), "{name}");
+        assert!(active <= most, "{name}: {active} active");
+        assert!((-1e-9..1e-3).contains(&over), "{name}: energy {over:+e}");
+        assert!(solution.residuals().iter().all(|r| r.miss.abs() < 1e-11), "{name}");
+    }
+}
+
+/// How the run on a random problem ended.
+enum Outcome {
+    /// The energy above the least, as a share of the bound; `None` where it is not comparable.
+    Ended(Option<f64>),
+    /// Rows so close to each other that not all could be met, which the notes say.
+    Crowded,
+}
+
+/// What is wrong with the run on a random problem, else how it ended.
+fn judged(number: u64) -> Result<Outcome, String> {
+    let (problem, bound) = random::problem(number);
+    let full = match Solver::new(problem.clone(), Settings::default()).and_then(Solver::run) {
+        Ok(full) => full,
+        Err(SolveError::Problem(_) | SolveError::Degenerate { .. }) => return Ok(Outcome::Crowded),
+        Err(e) => return Err(format!("{number}: {e}")),
+    };
+    let (rounds, solution) = match stepped(&problem, bound) {
+        Err(SolveError::Degenerate { .. }) => return Ok(Outcome::Crowded),
+        other => other.map_err(|e| format!("{number}: {e}"))?,
+    };
+    let states: BTreeSet<u64> = rounds.iter().map(|r| r.state).collect();
+    if states.len() < rounds.len() {
+        return Err(format!("{number}: a state came twice"));
+    }
+    if !solution.converged() {
+        let said = solution.notes().iter().any(|n| n.contains("left out"));
+        return if said { Ok(Outcome::Crowded) } else { Err(format!("{number}: not converged")) };
+    }
+    let size = solution.coefficients().iter().flatten().fold(1.0, |m: f64, x| m.max(x.abs()));
+    if let Some(r) = solution.residuals().iter().find(|r| !r.soft && r.miss.abs() > 1e-8 * size) {
+        return Err(format!("{number}: {} misses by {:e}", r.id, r.miss));
+    }
+    // Soft rows belong to the energy; where next to nothing is needed rounding has the word.
+    let last = rounds.last().map_or(0.0, |r| r.energy);
+    let least = full.energy();
+    let soft = full.residuals().iter().any(|r| r.soft);
+    let comparable = !soft && least > 1e-9 * size * size;
+    Ok(Outcome::Ended(comparable.then(|| (last / least - 1.0) / bound)))
+}
+
+/// Runs problems; numbers of crowded ones, of comparable ones, of those over their bound, and the worst share.
+fn run(numbers: std::ops::Range<u64>) -> (usize, usize, usize, f64) {
+    let (mut crowded, mut shares, mut wrong) = (0, Vec::new(), Vec::new());
+    for number in numbers {
+        match judged(number) {
+            Ok(Outcome::Crowded) => crowded += 1,
+            Ok(Outcome::Ended(share)) => shares.extend(share),
+            Err(e) => wrong.push(e),
+        }
+    }
+    assert!(wrong.is_empty(), "{} wrong: {wrong:?}", wrong.len());
+    let least = shares.iter().fold(0.0, |m: f64, s| m.min(*s));
+    assert!(least > -1e-4, "below the least energy: {least}");
+    let over = shares.iter().filter(|s| **s > 1.0).count();
+    (crowded, shares.len(), over, shares.iter().fold(0.0, |m: f64, s| m.max(*s)))
+}
+
+#[test]
+fn random_problems_end_without_a_state_coming_twice_and_within_the_bound() {
+    // ONDELETTE_PROBLEMS=10000 for as many (release mode: minutes).
+    let many = std::env::var("ONDELETTE_PROBLEMS").ok().and_then(|n| n.parse().ok()).unwrap_or(150);
+    let (crowded, compared, over, worst) = run(0..many);
+    println!("{many} problems: {crowded} crowded, {over} of {compared} over the bound, the worst {worst:.2} of it");
+    assert!(crowded * 15 <= many as usize, "{crowded} crowded");
+    assert!(over * 50 <= compared && worst < 1.5, "{over} of {compared} over the bound, the worst {worst:.2}");
+}
