@@ -55,8 +55,8 @@ impl<'a> Prober<'a> {
 
     /// The side under a point whose normal faces the same way, and the side-local coordinates there.
     ///
-    /// The nearest side within [`REACH`] of the scene's diagonal; ties, at edges, go to the lower side; what another side
-    /// covers is not looked at.
+    /// The nearest side within [`REACH`] of the scene's diagonal; ties, at edges, go to the lower side; what another
+    /// side covers is not looked at.
     pub fn find(&self, point: DVec3, normal: DVec3) -> Option<(usize, [f64; 2])> {
         let reach = REACH * self.solution.scene().diagonal();
         let normal = normal.normalize_or_zero();

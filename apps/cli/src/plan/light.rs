@@ -270,7 +270,8 @@ impl RelightPlan {
         let error = args.error.as_deref().map(values::percent).transpose()?;
         if paints.is_empty() && error.is_none() && !args.refine {
             return Err(Refusal::new(
-                "nothing to change: give --emission MATERIAL=r,g,b, --reflectance MATERIAL=r,g,b, or --refine --error 0.5%",
+                "nothing to change: give --emission MATERIAL=r,g,b, --reflectance MATERIAL=r,g,b, \
+                 or --refine --error 0.5%",
             ));
         }
         let plan = LightPlan {

@@ -9,7 +9,8 @@ const CURVE: &str = r#"{ "boundary": "open", "levels": 3, "domain": [0, 1], "ene
  { "id": "c", "at": 1, "position": [2, null], "tangent": [1, 0] }, { "id": "k", "at": 0.2, "curvature": 0.5 } ] }"#;
 const RING: &str = r#"{ "boundary": "periodic", "spans": 16, "energy": { "intrinsic": "mvc" }, "constraints": [
  { "at": 0, "position": [1, 0] }, { "at": 0.25, "position": [0, 1] }, { "at": 0.5, "position": [-1, 0] } ] }"#;
-const SHEET: &str = r#"{ "levels": 2, "stiffness": [ { "from": [0, 0], "to": [0.5, 1], "factor": 10 } ], "constraints": [
+const SHEET: &str = r#"{ "levels": 2, "stiffness": [ { "from": [0, 0], "to": [0.5, 1], "factor": 10 } ],
+    "constraints": [
  { "at": [0, 0], "position": 1 }, { "at": [1, 0], "position": 3 }, { "at": [1, 1], "position": 5 },
  { "id": "rail", "curve": { "at": [[0, 1], [1, 0.5]], "position": [[1], [2]] } } ] }"#;
 const DAT: &str = "FOO\n 1.0 0.0\n 0.6 0.1\n 0.3 0.12\n 0.0 0.0\n 0.3 -0.1\n 0.7 -0.05\n 1.0 0.0\n";

@@ -83,7 +83,8 @@ fn an_intrinsic_energy_finds_the_circle_and_says_when_there_is_no_minimum() {
     place.write(
         "loose.json",
         r#"{ "boundary": "periodic", "spans": 32, "energy": { "intrinsic": "mec" }, "constraints": [
-            { "at": 0, "position": [1, 0] }, { "at": 0.25, "position": [0, 0.2] }, { "at": 0.5, "position": [-1, 0] } ] }"#,
+            { "at": 0, "position": [1, 0] }, { "at": 0.25, "position": [0, 0.2] },
+            { "at": 0.5, "position": [-1, 0] } ] }"#,
     );
     let ended = place.run("curve loose.json -o loose-out.json").with_code(1);
     assert!(ended.err.contains("without bound") && ended.err.contains("not converged"), "{}", ended.err);
@@ -101,7 +102,8 @@ fn a_surface_is_led_along_curves_and_mirrored() {
             {{ "id": "spine", "curve": {{ "at": [[0.2, 0], [0.5, 0.4], [0.6, 1]],
                 "position": [[0.4, 0, 0.284], [1, 1, 1], [1.2, 2, 0]] }} }},
             {{ "id": "corner", "at": [0, 1], "position": [0, 2, 0] }},
-            {{ "id": "other", "at": [1, 1], "image": {{ "of": [0, 1], "factors": [-1, 1, 1], "offset": [2, 0, 0] }} }} ] }}"#
+            {{ "id": "other", "at": [1, 1],
+                "image": {{ "of": [0, 1], "factors": [-1, 1, 1], "offset": [2, 0, 0] }} }} ] }}"#
         ),
     );
     let ended = place.run("surface tent.json -o out.json -o out.png --report r.json");

@@ -14,7 +14,8 @@ const MOST_SAMPLES: usize = 4096;
 /// splines through the given lists at equal steps of u (two give a straight line).
 ///
 /// `samples`: how many; `None`: one more than the spans that the curve crosses, as many as a curve along an axis can
-/// meet exactly. The constraints are called `id[0]`, `id[1]`, ...; those that follow from others are named by the solver.
+/// meet exactly. The constraints are called `id[0]`, `id[1]`, ...; those that follow from others are named by the
+/// solver.
 ///
 /// # Errors
 /// [`SolveError`]: fewer than two places or points, numbers that are not finite, points of different dimension.

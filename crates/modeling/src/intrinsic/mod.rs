@@ -3,13 +3,13 @@
 //! The minimum-energy curve (elastica) has the least integral of squared curvature over arc length among the curves
 //! that meet the constraints, the minimum-variation curve (Moreton and Sequin 1992) the least integral of the squared
 //! change of curvature along it (across the tangent: k_s^2, in space k_s^2 + k^2 torsion^2): circles and straight lines
-//! cost nothing. Both are functionals of the shape alone; the parameter runs along it as evenly as the parameters of the
-//! constraints allow.
+//! cost nothing. Both are functionals of the shape alone; the parameter runs along it as evenly as the parameters of
+//! the constraints allow.
 //!
 //! Newton's method with exact second derivatives of every span, damped by the quadratic energy whose functional it is
 //! (Levenberg and Marquardt), on a sparse factor with the constraints as a small dense one. A term that asks for even
-//! speed makes the problem regular; its weight falls, and the speeds that it asks for follow the curve until the term is
-//! zero, so that the result is the functional's own.
+//! speed makes the problem regular; its weight falls, and the speeds that it asks for follow the curve until the
+//! term is zero, so that the result is the functional's own.
 
 mod jet;
 mod objective;
@@ -28,8 +28,8 @@ use std::str::FromStr;
 /// Which functional is least.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Minimum {
-    /// Squared curvature over arc length: the minimum-energy curve, MEC. It scales with one over the length, so that long
-    /// loops are cheap: of closed curves of free length none is the least, and what is found is a local minimum.
+    /// Squared curvature over arc length: the minimum-energy curve, MEC. It scales with one over the length, so that
+    /// long loops are cheap: of closed curves of free length none is the least, and what is found is a local minimum.
     Energy,
     /// Squared change of curvature over arc length: the minimum-variation curve, MVC.
     Variation,

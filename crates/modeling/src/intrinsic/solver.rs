@@ -33,8 +33,8 @@ pub struct IntrinsicCurve {
     pub functional: f64,
     /// Length of the curve.
     pub length: f64,
-    /// What is left of the term of even speed: the integral, over the parameter from 0 to 1, of the squared derivative of
-    /// the logarithm of speed over wanted speed.
+    /// What is left of the term of even speed: the integral, over the parameter from 0 to 1, of the squared
+    /// derivative of the logarithm of speed over wanted speed.
     pub speed_term: f64,
     /// Largest move of a control point in the last Newton step, over the length of the curve.
     pub change: f64,
@@ -119,8 +119,9 @@ impl IntrinsicSolver {
     /// Poses the problem: an open or periodic curve of 2 or 3 coordinates.
     ///
     /// Positions are met at their parameters; tangents as directions with a sense (their length means nothing here);
-    /// normals as orthogonal directions; curvatures by linearising. Soft constraints (weight times the squared miss) join
-    /// the functional. Between exact positions the parameter is in proportion to length, as smoothly as they allow.
+    /// normals as orthogonal directions; curvatures by linearising. Soft constraints (weight times the squared miss)
+    /// join the functional. Between exact positions the parameter is in proportion to length, as smoothly as they
+    /// allow.
     /// `tolerance`: the largest last move of a control point, over the length of the curve.
     ///
     /// # Errors
@@ -352,8 +353,8 @@ impl IntrinsicSolver {
         let length = speed::length(&self.objective, &self.x);
         let why = if length > LONG {
             format!(
-                "the curve grows without bound ({length:.0} times its first length) and has no minimum: hold it by more \
-                 points or tangents"
+                "the curve grows without bound ({length:.0} times its first length) and has no minimum: hold it by \
+                 more points or tangents"
             )
         } else if self.by > STUCK {
             format!("no step lowers the functional any more; the last moved the curve by {:.1e}", self.change)

@@ -1,8 +1,8 @@
 //! The speed that a curve is asked to have: as even as the parameters of its points allow.
 //!
 //! Arc length over the parameter is interpolated, monotonely, through the arc lengths that the curve has at its
-//! constraints (Fritsch and Carlson's cubics, slopes by harmonic means); the speed is its derivative. The curve can then
-//! have exactly that speed without changing its shape, and the term that asks for it does not bend the result.
+//! constraints (Fritsch and Carlson's cubics, slopes by harmonic means); the speed is its derivative. The curve can
+//! then have exactly that speed without changing its shape, and the term that asks for it does not bend the result.
 
 use super::objective::Objective;
 use super::span::{GAUSS, PACES};

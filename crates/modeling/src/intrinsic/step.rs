@@ -14,8 +14,8 @@ pub(crate) struct Newton {
     pub(crate) multipliers: Vec<f64>,
 }
 
-/// The minimum of the model x^T gradient + x^T (entries + damping) x / 2 on the exact equations; `None` where the matrix
-/// is not positive definite: damp more.
+/// The minimum of the model x^T gradient + x^T (entries + damping) x / 2 on the exact equations; `None` where the
+/// matrix is not positive definite: damp more.
 ///
 /// Entries are of the lower triangle and may repeat. Soft equations are in the gradient and the entries already.
 pub(crate) fn newton(

@@ -5,10 +5,11 @@
 //! solution is that of all samples, and an iteration reads few.
 //!
 //! The scatter of the rows goes the same way as light: what one element receives too much, all others receive again
-//! after reflection. Where much is reflected, this common part is larger than the scatter itself. It is found by solving
-//! for the scatter, with signs drawn at random for the elements, a few times over.
+//! after reflection. Where much is reflected, this common part is larger than the scatter itself. It is found by
+//! solving for the scatter, with signs drawn at random for the elements, a few times over.
 
-use super::gather::{self, Field, Verdict};
+use super::field::Field;
+use super::gather::{self, Verdict};
 use super::{Phase, RAYS_A_STEP, Sampled, positive, stitch};
 use crate::solver::Event;
 use ondelette_numerics::krylov::Gmres;

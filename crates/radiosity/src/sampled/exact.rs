@@ -1,5 +1,5 @@
-//! Direct light read exactly: where a fitted function blurs the edge of a shadow, the light of the lamps is looked up at
-//! the very point instead.
+//! Direct light read exactly: where a fitted function blurs the edge of a shadow, the light of the lamps is looked
+//! up at the very point instead.
 
 use super::Kept;
 use super::lamps::Lamps;

@@ -6,12 +6,13 @@
 //! wherever they arrive. No pair of surfaces is ever looked at, so n surfaces cost about n log n; no element of one
 //! part refines the other.
 //!
-//! [`lamps`] -> [`direct`] (D on an element), [`gather`] (a row of I) -> [`Sampled`] (the stepped solver) with [`balance`]
-//! (the equations solved) and [`plan`] (what to spend the next batch on).
+//! [`lamps`] -> [`direct`] (D on an element), [`gather`] (a row of I) -> [`Sampled`] (the stepped solver) with
+//! [`balance`] (the equations solved) and [`plan`] (what to spend the next batch on).
 
 mod balance;
 mod direct;
 mod exact;
+mod field;
 mod gather;
 mod kept;
 mod lamps;

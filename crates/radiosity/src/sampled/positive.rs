@@ -1,11 +1,11 @@
-//! Light is never negative: where scatter or the edge of a shadow tilts an element's function below zero, its slopes are
-//! lowered until its darkest corner is dark. The mean stays as it is.
+//! Light is never negative: where scatter or the edge of a shadow tilts an element's function below zero, its slopes
+//! are lowered until its darkest corner is dark. The mean stays as it is.
 
 use ondelette_compress::Forest;
 use ondelette_wavelet::cell::CellShape;
 
-/// Lowers slopes of coefficients at the leaves. Bases of the second order only; others are left as they are. Cost linear
-/// in the nodes.
+/// Lowers slopes of coefficients at the leaves. Bases of the second order only; others are left as they are. Cost
+/// linear in the nodes.
 pub(super) fn keep_positive(forest: &Forest, irradiance: &mut [[f64; 3]]) {
     let stride = forest.stride();
     let corners = [CellShape::Square, CellShape::Triangle].map(|shape| {

@@ -1,0 +1,69 @@
+//! The light that rays read.
+
+use super::gather::{MOST, Ray};
+use ondelette_compress::{Forest, NodeId};
+use ondelette_wavelet::cell::CellShape;
+
+/// A radiosity at the leaves, in the form in which rays read it fastest.
+pub(super) struct Field<'a> {
+    pub(super) forest: &'a Forest,
+    coefficients: &'a [[f64; 3]],
+    /// For bases up to the second order: `a + b s + c t + d s t` on each leaf.
+    bilinear: Vec<[[f64; 3]; 4]>,
+}
+
+impl<'a> Field<'a> {
+    /// Prepares coefficients at the leaves. Cost linear in the nodes.
+    pub(super) fn new(forest: &'a Forest, coefficients: &'a [[f64; 3]]) -> Self {
+        let bases = [CellShape::Square, CellShape::Triangle].map(|shape| forest.basis(shape));
+        let mut bilinear = Vec::new();
+        if bases.iter().all(|b| b.is_nested() && b.order() <= 2) {
+            // each function by its values at three or four corners
+            let forms = bases.map(|basis| {
+                let at = |x: [f64; 2]| {
+                    let mut values = [0.0; MOST];
+                    basis.eval(x, &mut values);
+                    values
+                };
+                let [o, s, t, st] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]].map(at);
+                let square = if basis.shape() == CellShape::Square { 1.0 } else { 0.0 };
+                let form = |i: usize| [o[i], s[i] - o[i], t[i] - o[i], square * (st[i] - s[i] - t[i] + o[i])];
+                (0..basis.len()).map(form).collect::<Vec<[f64; 4]>>()
+            });
+            let stride = forest.stride();
+            bilinear = vec![[[0.0; 3]; 4]; forest.len()];
+            for (n, (node, out)) in forest.nodes().iter().zip(&mut bilinear).enumerate() {
+                if node.first_child == 0 {
+                    let forms = &forms[usize::from(node.cell.shape == CellShape::Triangle)];
+                    for (form, c) in forms.iter().zip(&coefficients[n * stride..]) {
+                        for (o, f) in out.iter_mut().zip(form) {
+                            (0..3).for_each(|k| o[k] += f * c[k]);
+                        }
+                    }
+                }
+            }
+        }
+        Field { forest, coefficients, bilinear }
+    }
+
+    /// What a ray meets.
+    pub(super) fn met(&self, ray: &Ray) -> [f64; 3] {
+        if ray.leaf == Ray::NOWHERE {
+            return [0.0; 3];
+        }
+        let [s, t] = ray.to.map(f64::from);
+        if let Some([a, b, c, d]) = self.bilinear.get(ray.leaf as usize) {
+            let st = s * t;
+            return std::array::from_fn(|k| a[k] + b[k] * s + c[k] * t + d[k] * st);
+        }
+        let basis = self.forest.basis(self.forest.node(NodeId(ray.leaf)).cell.shape);
+        let mut values = [0.0; MOST];
+        basis.eval([s, t], &mut values);
+        let own = &self.coefficients[ray.leaf as usize * self.forest.stride()..][..basis.len()];
+        let mut sum = [0.0; 3];
+        for (c, v) in own.iter().zip(&values) {
+            (0..3).for_each(|k| sum[k] += c[k] * v);
+        }
+        sum
+    }
+}
