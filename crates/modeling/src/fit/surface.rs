@@ -171,7 +171,7 @@ pub fn surface(data: &Scatter, settings: FitSettings) -> Result<Fit, FitError> {
         let mut parts = Part::windows(&space, &data.points, &centred, side)?;
         let (mut begin, mut steps) = (BEGIN, &STEPS[..]);
         // A coarser surface finds nearly the same weights; the last steps are the fine one's.
-        if let (1, Some(coarse)) = (parts.len(), space.coarser().filter(|c| c.axes()[0].spans() >= 32)) {
+        if let (1, Some(coarse)) = (parts.len(), space.coarser().filter(|c| c.axes()[0].spans() >= 128)) {
             let mut parts = Part::windows(&coarse, &data.points, &centred, side)?;
             let found = search(unit, given, begin, &STEPS[..2], &mut |w, s| Part::validate_all(&mut parts, w, s))?;
             (begin, steps) = ([found.0 / unit, found.1], &STEPS[2..]);
