@@ -171,7 +171,12 @@ impl Record<'_> {
                     match (statistics.too_large, solution.settings().links.subdivision) {
                         (Some(matrix), _) => format!("{missed}{matrix}"),
                         (None, Some(n)) => format!("{missed}a subdivision of {n} is too coarse"),
-                        (None, None) => format!("{missed}no element may be split further"),
+                        (None, None) if self.plan.stays => {
+                            format!("{missed}--refine spends the rays that are missing")
+                        }
+                        (None, None) => {
+                            format!("{missed}no element may be split further, or the memory allowed is used up")
+                        }
                     }
                 }
             };

@@ -104,6 +104,8 @@ pub(crate) struct LightPlan {
     pub(crate) keep: bool,
     /// Whether pictures gather direct light anew.
     pub(crate) exact: bool,
+    /// Whether no ray is cast, whatever the error: relighting without refinement.
+    pub(crate) stays: bool,
     /// Bytes that elements and samples may take.
     pub(crate) memory: Option<u64>,
     pub(crate) max_time: Option<Duration>,
@@ -199,6 +201,7 @@ impl LightPlan {
             settings,
             keep: args.keep_links,
             exact: args.direct == DirectLight::Gather,
+            stays: false,
             memory: args.memory.as_deref().map(values::memory).transpose()?,
             max_time: args.max_time.as_deref().map(values::duration).transpose()?,
             threads: args.threads.as_deref().map(values::threads).transpose()?,
@@ -281,6 +284,7 @@ impl RelightPlan {
             settings: Settings::default(),
             keep: args.keep_links,
             exact: false,
+            stays: !args.refine,
             memory: None,
             max_time: args.max_time.as_deref().map(values::duration).transpose()?,
             threads: args.threads.as_deref().map(values::threads).transpose()?,

@@ -24,7 +24,7 @@ const MOST_BLOCKERS: usize = 24;
 const SLIVER: f64 = 2e-6;
 /// Share of an element's light from which a lamp is worth a look at what stands before it: in units of the promised
 /// error, and its limits.
-const WORTHY: f64 = 3.0;
+const WORTHY: f64 = 0.8;
 const WORTHY_LIMITS: [f64; 2] = [0.04, 0.15];
 
 /// One emitting side.

@@ -17,6 +17,8 @@ pub(super) const AIM: f64 = 0.95;
 const SHARES: [f64; 3] = [0.35, 0.72, 0.55];
 /// Mean absolute value of a scattered number, over its standard deviation.
 pub(super) const MEAN_OF_SCATTER: f64 = 0.8;
+/// Share of the aim for the scatter of direct light, where rays decide what is seen: dear, and falling slowly.
+const LAMP_SCATTER: f64 = 0.55;
 /// Scatter falls with this power of the samples.
 const POWER: f64 = 0.7;
 /// Most directions of a point and half.
@@ -129,7 +131,7 @@ impl Sampled {
         loop {
             let aim = self.aim * self.settings.error * self.whole / SAFETY;
             let leaves = self.worst_leaves(SHARES[0] * aim);
-            let unclear = self.unclear_leaves(SHARES[0] * aim, &leaves);
+            let unclear = self.unclear_leaves(LAMP_SCATTER * aim, &leaves);
             if !leaves.is_empty() && self.make_room(&[]) {
                 return self.stop_for_memory();
             }
