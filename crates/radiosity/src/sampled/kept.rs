@@ -5,7 +5,7 @@
 
 use super::gather::{Gather, Point, Ray};
 use super::lamps::Lamps;
-use super::{Phase, Sampled, plan};
+use super::{Phase, Sampled, counted_area, plan};
 use crate::kernel::LightKernel;
 use crate::scene::{Paint, PaintError, Scene};
 use crate::solution::Solution;
@@ -170,36 +170,17 @@ impl Sampled {
         let mut points = 0;
         let gathers: Vec<Gather> =
             kept.gathers.iter().map(|record| Gather::restore(kept, record, &mut points, &mut rays)).collect();
-        let stride = forest.stride();
+        let streaming = kept.gathers.iter().any(|g| g[2] > Gather::FIRST && g[4] == 0);
         let mut sampled = Sampled {
             direct: kept.direct.clone(),
             misfit: kept.misfit.clone(),
             scatter: kept.scatter.clone(),
             rays: kept.lamp_rays.clone(),
             lit: solution.lit().to_vec(),
-            verdicts: vec![Default::default(); gathers.len()],
-            indirect: vec![[0.0; 3]; gathers.len() * stride],
             irradiance: solution.coefficients().to_vec(),
-            gathers,
-            settings: solution.settings(),
-            kernel,
-            lamps,
-            forest,
-            phase: Phase::Finished,
-            counted_area: 0.0,
-            whole: 0.0,
-            cap: None,
-            streaming: kept.gathers.iter().any(|g| g[2] > Gather::FIRST && g[4] == 0),
-            amplification: 1.0,
-            corrections: 0,
-            aim: plan::AIM,
-            rounds: 0,
-            refitted: false,
-            stalled: false,
-            missed: Vec::new(),
-            error: f64::INFINITY,
+            streaming,
             statistics: solution.statistics().clone(),
-            scene,
+            ..Self::at_the_start(scene, solution.settings(), kernel, lamps, forest, gathers)
         };
         sampled.prepare();
         sampled.begin_again();
@@ -225,9 +206,7 @@ impl Sampled {
     }
 
     fn begin_again(&mut self) {
-        let sides = self.scene.sides.iter().zip(self.kernel.sides());
-        let counted = sides.filter(|(side, _)| !self.scene.material(**side).is_pure_emitter());
-        self.counted_area = counted.map(|(_, frame)| frame.area).sum();
+        self.counted_area = counted_area(&self.scene, &self.kernel);
         (self.aim, self.rounds, self.corrections) = (plan::AIM, 0, 0);
         (self.refitted, self.stalled, self.error, self.whole) = (false, false, f64::INFINITY, 0.0);
         // from the dark: the same light, whatever was balanced before

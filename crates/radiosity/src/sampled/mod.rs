@@ -117,6 +117,12 @@ pub(crate) struct Sampled {
     statistics: Statistics,
 }
 
+/// Area of the sides that the promise counts.
+fn counted_area(scene: &Scene, kernel: &LightKernel) -> f64 {
+    let counted = scene.sides.iter().zip(kernel.sides()).filter(|(s, _)| !scene.material(**s).is_pure_emitter());
+    counted.map(|(_, frame)| frame.area).sum()
+}
+
 impl Sampled {
     pub(crate) fn new(scene: Scene, settings: Settings) -> Result<Self, SolveError> {
         let kernel = LightKernel::new(&scene);
@@ -128,8 +134,6 @@ impl Sampled {
             forest.add_root(side.shape, side.area);
             area += side.area;
         }
-        let counted = scene.sides.iter().zip(kernel.sides()).filter(|(s, _)| !scene.material(**s).is_pure_emitter());
-        let counted_area = counted.map(|(_, frame)| frame.area).sum();
         let mut n = 0;
         while n < forest.len() {
             let id = NodeId(n as u32);
@@ -143,8 +147,21 @@ impl Sampled {
         let gathers: Vec<Gather> = leaves.iter().map(|&id| Gather::new(&forest, id, fine(id))).collect();
         let draw = |(k, gather): (usize, &Gather)| Gather::all(k, gather.points(), 0..FIRST_DIRECTIONS);
         let draws = gathers.iter().enumerate().map(draw).collect();
+        let phase = Phase::Fitting { nodes: leaves, done: 0, draws };
+        Ok(Sampled { phase, ..Self::at_the_start(Arc::new(scene), settings, kernel, lamps, forest, gathers) })
+    }
+
+    /// All that is known of a scene before anything is fitted, drawn or balanced.
+    fn at_the_start(
+        scene: Arc<Scene>,
+        settings: Settings,
+        kernel: LightKernel,
+        lamps: Lamps,
+        forest: Forest,
+        gathers: Vec<Gather>,
+    ) -> Self {
         let (nodes, stride) = (forest.len(), forest.stride());
-        Ok(Sampled {
+        Sampled {
             direct: vec![0.0; nodes * stride * lamps.groups.len()],
             misfit: vec![0.0; nodes * lamps.groups.len()],
             scatter: vec![0.0; nodes * lamps.groups.len()],
@@ -153,14 +170,14 @@ impl Sampled {
             verdicts: vec![Verdict::default(); gathers.len()],
             indirect: vec![[0.0; 3]; gathers.len() * stride],
             irradiance: vec![[0.0; 3]; nodes * stride],
-            scene: Arc::new(scene),
+            counted_area: counted_area(&scene, &kernel),
+            scene,
             settings,
             kernel,
             lamps,
             forest,
             gathers,
-            phase: Phase::Fitting { nodes: leaves, done: 0, draws },
-            counted_area,
+            phase: Phase::Finished,
             whole: 0.0,
             cap: None,
             streaming: false,
@@ -173,7 +190,7 @@ impl Sampled {
             missed: Vec::new(),
             error: f64::INFINITY,
             statistics: Statistics::default(),
-        })
+        }
     }
 
     pub(crate) fn settings(&self) -> Settings {
