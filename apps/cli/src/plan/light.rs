@@ -209,11 +209,23 @@ impl LightPlan {
             named,
             report: args.report.clone(),
         };
-        if plan.keep && !plan.named.iter().any(|o| o.kind == Kind::Solution) {
+        let method = plan.settings.method;
+        if (plan.keep || plan.exact) && method != Method::Sampled {
+            let flag = if plan.keep { "--keep-links" } else { "--direct gather" };
+            return Err(Refusal::new(format!(
+                "{flag} needs the samples of --method sampled; with --method {method}, leave it out"
+            )));
+        }
+        plan.check_outputs()?;
+        Ok(plan)
+    }
+
+    /// Refuses outputs that cannot be written, and samples to be kept nowhere.
+    fn check_outputs(&self) -> Result<(), Refusal> {
+        if self.keep && !self.named.iter().any(|o| o.kind == Kind::Solution) {
             return Err(Refusal::new("--keep-links: samples are kept in a solution file; add -o NAME.onl"));
         }
-        Outputs { files: plan.named.clone(), report: plan.report.clone() }.check(&plan.scene)?;
-        Ok(plan)
+        Outputs { files: self.named.clone(), report: self.report.clone() }.check(&self.scene)
     }
 
     /// Whether the files go to [`DEFAULT_FOLDER`].
@@ -292,10 +304,7 @@ impl RelightPlan {
             named,
             report: args.report.clone(),
         };
-        if plan.keep && !plan.named.iter().any(|o| o.kind == Kind::Solution) {
-            return Err(Refusal::new("--keep-links: samples are kept in a solution file; add -o NAME.onl"));
-        }
-        Outputs { files: plan.named.clone(), report: plan.report.clone() }.check(&plan.scene)?;
+        plan.check_outputs()?;
         Ok(RelightPlan { light: plan, paints, refine: args.refine, error })
     }
 }

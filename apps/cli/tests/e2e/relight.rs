@@ -52,6 +52,8 @@ fn what_cannot_be_lit_anew_is_refused() {
         ("light room.obj --keep-links -o x.png", "add -o NAME.onl"),
         ("light room.obj --memory 1 -o x.png", "512MB"),
         ("light room.obj --method wavelet --memory 1GB -o x.png", "--method sampled"),
+        ("light room.obj --method wavelet --keep-links -o x.onl", "--method sampled"),
+        ("light room.obj --method wavelet --direct gather -o x.png", "--method sampled"),
         ("light room.obj --light at=0,0 -o x.png", "three numbers"),
     ] {
         let ended = place.run(arguments).with_code(2);

@@ -104,7 +104,7 @@ pub enum SolveError {
     /// A solution without samples to go on from.
     #[error(
         "the solution of '{0}' did not keep its samples, so there is nothing to go on from: \
-         solve it again and keep them (ondelette light --keep-links)"
+         solve it again with the sampled method (the default) and --keep-links"
     )]
     NothingKept(String),
 }
