@@ -65,6 +65,7 @@ pub(crate) enum Command {
   ondelette light room.glb -o room.png -o room.glb -o room.onl --report room.json
   ondelette light room.obj --two-sided --basis m3 --error 0.5% --max-time 2m
   ondelette light room.glb -o view.exr --camera eye=1,1.6,5:at=1,1,0:fov=50
+  ondelette light room.glb --error 3% --direct gather -o baked.glb -o room.png
   ondelette light room.obj --method wavelet --basis m3 --solver gauss-seidel
   ondelette light room.obj --method classical --error 10% --solver shooting
   ondelette light room.obj --method galerkin --basis m2 --subdivision 3
@@ -133,7 +134,8 @@ pub(crate) struct LightArgs {
     #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     pub(crate) max_time: Option<String>,
 
-    /// Direct light in pictures: fitted (as solved), or gathered anew at every pixel that is in a penumbra
+    /// Direct light in pictures and lit models: fitted (as solved), or gathered anew, with exact visibility, at every
+    /// pixel and vertex that is in a penumbra; models get as many vertices there as the shadows need
     #[arg(long, value_name = "HOW", default_value = "fitted")]
     pub(crate) direct: DirectLight,
 
@@ -202,6 +204,10 @@ pub(crate) struct RelightArgs {
     /// What to write; may be repeated: .glb .png .exr .csv .onl as for `ondelette light`
     #[arg(short = 'o', long = "output", value_name = "PATH", required = true)]
     pub(crate) outputs: Vec<PathBuf>,
+
+    /// Direct light in pictures and lit models, as for `ondelette light`
+    #[arg(long, value_name = "HOW", default_value = "fitted")]
+    pub(crate) direct: DirectLight,
 
     /// Keep the samples in the .onl file that is written
     #[arg(long)]

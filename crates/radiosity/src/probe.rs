@@ -88,16 +88,48 @@ impl<'a> Prober<'a> {
     /// Irradiance at side-local coordinates, exactly 0 inside of things: [`Solution::irradiance`] with a look around on
     /// elements that are only partly lit.
     pub fn irradiance(&self, side: usize, at: [f64; 2]) -> Rgb {
-        let (leaf, _) = self.solution.forest().locate(side, at);
-        let lit = self.solution.lit()[leaf.index()];
-        if lit < 1.0 && (lit == 0.0 || self.kernel.is_buried(side, self.solution.point(side, at))) {
+        let (leaf, x) = self.solution.forest().locate(side, at);
+        if self.is_inside(leaf, side, at) {
             return Rgb::BLACK;
         }
-        let exact = self.exact.as_ref();
-        match exact.and_then(|e| e.correction(self.solution, &self.kernel, side, at)) {
-            Some(correction) => (self.solution.irradiance_in_leaf(side, at) + correction).map(|e| e.max(0.0)),
-            None => self.solution.irradiance(side, at),
+        match &self.exact {
+            Some(exact) if exact.is_marked(leaf) => {
+                let correction = exact.correction(self.solution, &self.kernel, leaf, x);
+                (self.solution.irradiance_in_leaf(side, at) + correction).map(|e| e.max(0.0))
+            }
+            _ => self.solution.irradiance(side, at),
         }
+    }
+
+    /// Whether direct light is gathered anew on a leaf: [`Prober::with_exact_direct_light`] was called, and the leaf's
+    /// functions miss too much of it.
+    ///
+    /// # Panics
+    /// If there is no such node.
+    pub fn is_penumbra(&self, leaf: NodeId) -> bool {
+        self.exact.as_ref().is_some_and(|exact| exact.is_marked(leaf))
+    }
+
+    /// Irradiance on one leaf at a local point of its cell, also on its edges, where [`Prober::irradiance`] looks at the
+    /// neighbours too. Inside of things it is the leaf's function, not 0: what is interpolated between points on either
+    /// side of their foot would be dark in front of it.
+    ///
+    /// # Panics
+    /// If there is no such node.
+    pub fn irradiance_on(&self, leaf: NodeId, x: [f64; 2]) -> Rgb {
+        let cell = &self.solution.forest().node(leaf).cell;
+        let fitted = self.solution.inside(leaf, x);
+        if !self.is_penumbra(leaf) || self.is_inside(leaf, cell.root as usize, cell.to_root(x)) {
+            return fitted;
+        }
+        let correction = self.exact.as_ref().map(|e| e.correction(self.solution, &self.kernel, leaf, x));
+        (fitted + correction.unwrap_or(Rgb::BLACK)).map(|e| e.max(0.0))
+    }
+
+    /// Whether a point of a side, on this leaf, is inside of something.
+    fn is_inside(&self, leaf: NodeId, side: usize, at: [f64; 2]) -> bool {
+        let lit = self.solution.lit()[leaf.index()];
+        lit < 1.0 && (lit == 0.0 || self.kernel.is_buried(side, self.solution.point(side, at)))
     }
 
     /// Radiosity (exitance plus reflected) at side-local coordinates.

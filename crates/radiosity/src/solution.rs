@@ -205,7 +205,7 @@ impl Solution {
     }
 
     /// The polynomial of one leaf.
-    fn inside(&self, leaf: NodeId, x: [f64; 2]) -> Rgb {
+    pub(crate) fn inside(&self, leaf: NodeId, x: [f64; 2]) -> Rgb {
         let basis = self.forest.basis_of(leaf);
         let mut values = [0.0; 36];
         basis.eval(x, &mut values);

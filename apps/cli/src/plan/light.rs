@@ -102,7 +102,7 @@ pub(crate) struct LightPlan {
     pub(crate) settings: Settings,
     /// Whether the samples go into the solution file.
     pub(crate) keep: bool,
-    /// Whether pictures gather direct light anew.
+    /// Whether pictures and models gather direct light anew.
     pub(crate) exact: bool,
     /// Whether no ray is cast, whatever the error: relighting without refinement.
     pub(crate) stays: bool,
@@ -295,7 +295,7 @@ impl RelightPlan {
             panels: Vec::new(),
             settings: Settings::default(),
             keep: args.keep_links,
-            exact: false,
+            exact: args.direct == DirectLight::Gather,
             stays: !args.refine,
             memory: None,
             max_time: args.max_time.as_deref().map(values::duration).transpose()?,

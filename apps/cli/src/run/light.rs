@@ -8,8 +8,8 @@ use crate::progress::Progress;
 use crate::report::{Record, Stages};
 use ondelette_io::onl::write_solution;
 use ondelette_io::write::{
-    ToneMap, create_folder, elements_path, lit_model, scene_tone, write_bytes, write_exr, write_glb, write_png,
-    write_tables,
+    LitModel, ModelPainter, ToneMap, create_folder, elements_path, scene_tone, write_bytes, write_exr, write_glb,
+    write_png, write_tables,
 };
 use ondelette_io::{ReadOptions, read_scene};
 use ondelette_numerics::par;
@@ -124,7 +124,15 @@ fn write_outputs(
                 write_tables(&output.path, solution)?;
                 record.written.push(elements_path(&output.path));
             }
-            _ => write_glb(&output.path, &lit_model(solution, scene_tone(solution), camera_of_model(record, camera)))?,
+            _ => {
+                let Some(model) = paint(record, camera, stop, progress) else {
+                    record.stopped = Some(Reason::Signal);
+                    tell("stopped by Ctrl-C while gathering shadows: the model and the picture are left out");
+                    return Ok(());
+                };
+                progress.stage(&format!("writing {}", output.path.display()), 0.0);
+                write_glb(&output.path, &model)?;
+            }
         }
         record.written.push(output.path.clone());
         record.stages.end(stage_of(output.kind));
@@ -158,6 +166,24 @@ fn write_outputs(
         record.stages.end(stage_of(output.kind));
     }
     Ok(())
+}
+
+/// The lit model, or nothing if a Ctrl-C came that had not come before.
+fn paint(record: &Record<'_>, camera: Option<Camera>, stop: Stop, progress: &mut Progress) -> Option<LitModel> {
+    let solution = record.solution;
+    let mut painter = ModelPainter::new(solution, scene_tone(solution), camera_of_model(record, camera));
+    if record.plan.exact {
+        painter = painter.with_exact_direct_light();
+    }
+    loop {
+        if stop.signalled() && record.stopped != Some(Reason::Signal) {
+            return None;
+        }
+        if painter.step() {
+            return Some(painter.into_model());
+        }
+        progress.stage("painting the model", painter.progress());
+    }
 }
 
 /// The picture, or nothing if a Ctrl-C came that had not come before.

@@ -14,7 +14,7 @@ mod tone;
 pub use atomic::{AtomicFile, check_writable, create_folder, remove_unfinished, write_bytes};
 pub use csv::{Cell, CsvWriter, push_row};
 pub use glb::{LitMesh, LitModel, ModelNote, glb_bytes, write_glb};
-pub use lit::{lit_model, scene_tone};
+pub use lit::{ModelPainter, lit_model, scene_tone};
 pub use picture::{exr_bytes, png_bytes, write_exr, write_png};
 pub use tables::{elements_path, write_tables};
 pub use tone::ToneMap;

@@ -7,6 +7,7 @@ use crate::kernel::LightKernel;
 use crate::rgb::Rgb;
 use crate::solution::Solution;
 use crate::visible::View;
+use ondelette_compress::NodeId;
 use ondelette_numerics::seed;
 use std::sync::Arc;
 
@@ -44,21 +45,16 @@ impl ExactDirect {
         Some(ExactDirect { lamps, kept, marked })
     }
 
-    /// What a solution's irradiance at a point lacks: the direct light there less its fitted function; `None` where the
-    /// function is good enough.
-    pub(crate) fn correction(
-        &self,
-        solution: &Solution,
-        kernel: &LightKernel,
-        side: usize,
-        at: [f64; 2],
-    ) -> Option<Rgb> {
+    /// Whether direct light is read exactly on a leaf.
+    pub(crate) fn is_marked(&self, leaf: NodeId) -> bool {
+        self.marked[leaf.index()]
+    }
+
+    /// What a leaf's function lacks at a local point: the direct light there less its fitted function.
+    pub(crate) fn correction(&self, solution: &Solution, kernel: &LightKernel, leaf: NodeId, x: [f64; 2]) -> Rgb {
         let forest = solution.forest();
-        let (leaf, x) = forest.locate(side, at);
-        if !self.marked[leaf.index()] {
-            return None;
-        }
         let cell = &forest.node(leaf).cell;
+        let (side, at) = (cell.root as usize, cell.to_root(x));
         let (point, normal) = (solution.point(side, at), kernel.element(cell).normal());
         let groups = &self.lamps.groups;
         let mut values = vec![[0.0; 2]; groups.len()];
@@ -77,6 +73,6 @@ impl ExactDirect {
             let fitted: f64 = own.iter().zip(&functions[..basis.len()]).map(|(c, f)| c * f).sum();
             sum += *exitance * (0.5 * (values[g][0] + values[g][1]) - fitted);
         }
-        Some(sum)
+        sum
     }
 }
