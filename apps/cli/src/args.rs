@@ -139,12 +139,14 @@ pub(crate) struct LightArgs {
     #[arg(long, value_name = "HOW", default_value = "fitted")]
     pub(crate) direct: DirectLight,
 
-    /// Keep in the .onl file what `ondelette relight` goes on from: the samples of the transport operator
+    /// Keep in the .onl file what `ondelette relight` goes on from: the samples of the transport operator (links are
+    /// always kept)
     #[arg(long)]
     pub(crate) keep_links: bool,
 
-    /// Most memory for elements and samples: 512MB, 2GB. Samples that do not fit are drawn again whenever they are read
-    /// (the scene and its ray structure come on top; see the report)
+    /// Most memory for elements, samples and links: 512MB, 2GB. Samples that do not fit are drawn again, and rows of a
+    /// full matrix coupled again, whenever they are read; links that adapt stop there, with an unfinished solution (the
+    /// scene and its ray structure come on top; see the report)
     #[arg(long, value_name = "SIZE", allow_hyphen_values = true)]
     pub(crate) memory: Option<String>,
 
@@ -181,7 +183,7 @@ pub(crate) struct LightArgs {
 
 Without --refine no ray is cast: the new error is stated, and the exit code is 1 if it is above the promise.")]
 pub(crate) struct RelightArgs {
-    /// Solution file of `ondelette light --keep-links -o NAME.onl`
+    /// Solution file of `ondelette light --keep-links -o NAME.onl`, or of a method with links
     #[arg(value_name = "SOLUTION.onl")]
     pub(crate) solution: PathBuf,
 

@@ -43,11 +43,21 @@ impl Stages {
     }
 }
 
+/// Bytes that the solver counted.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Memory {
+    /// Most of elements, samples or links, and working arrays.
+    pub(crate) counted: u64,
+    /// The scene and its ray structure.
+    pub(crate) scene: u64,
+}
+
 /// All that a report is made of.
 #[derive(Debug)]
 pub(crate) struct Record<'a> {
     pub(crate) plan: &'a LightPlan,
     pub(crate) solution: &'a Solution,
+    pub(crate) memory: Memory,
     pub(crate) ledger: Option<Ledger>,
     pub(crate) stopped: Option<Reason>,
     pub(crate) stages: Stages,
@@ -142,6 +152,11 @@ impl Record<'_> {
                     "rays": ledger.rays,
                 })
             }),
+            "memory": {
+                "cap_bytes": self.plan.memory,
+                "counted_bytes": self.memory.counted,
+                "scene_bytes": self.memory.scene,
+            },
             "peak_memory_bytes": peak_memory(),
             "units": {
                 "radiance": scene.quantity.radiance_unit(),

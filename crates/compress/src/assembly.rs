@@ -25,6 +25,8 @@ use ondelette_numerics::par;
 #[derive(Clone, Debug)]
 pub struct Assembly {
     leaves: Vec<NodeId>,
+    /// Leaves, the first of all, whose rows are stored.
+    rows: usize,
     done: usize,
     links: Links,
 }
@@ -33,8 +35,14 @@ impl Assembly {
     /// All pairs of the forest's present leaves, with memory set aside for `pairs` links of `numbers` numbers in all:
     /// a matrix that outgrows its memory is copied, and takes three times as much for a moment.
     pub fn of(forest: &Forest, pairs: u64, numbers: u64) -> Self {
-        let leaves = (0..forest.len() as u32).map(NodeId).filter(|&id| forest.is_leaf(id)).collect();
-        Assembly { leaves, done: 0, links: Links::with_room(pairs as usize, numbers as usize) }
+        Self::of_rows(forest, usize::MAX, pairs, numbers)
+    }
+
+    /// The rows of the first leaves alone; those of the others are for [`couple_row`].
+    pub fn of_rows(forest: &Forest, rows: usize, pairs: u64, numbers: u64) -> Self {
+        let leaves = leaves(forest);
+        let rows = rows.min(leaves.len());
+        Assembly { leaves, rows, done: 0, links: Links::with_room(pairs as usize, numbers as usize) }
     }
 
     /// Bytes that a pair of leaves takes whose bases have `receiver` and `shooter` functions.
@@ -44,12 +52,12 @@ impl Assembly {
 
     /// Number of pairs.
     pub fn len(&self) -> usize {
-        self.leaves.len() * self.leaves.len()
+        self.rows * self.leaves.len()
     }
 
     /// Whether there is nothing to couple.
     pub fn is_empty(&self) -> bool {
-        self.leaves.is_empty()
+        self.len() == 0
     }
 
     /// Number of pairs done.
@@ -103,6 +111,33 @@ impl Assembly {
         self.links.finish(forest);
         self.links
     }
+}
+
+/// The leaves of a forest, in node order: the rows and columns of its full matrix.
+pub fn leaves(forest: &Forest) -> Vec<NodeId> {
+    (0..forest.len() as u32).map(NodeId).filter(|&id| forest.is_leaf(id)).collect()
+}
+
+/// Couples one row of the full matrix and hands every link with its block to `each`, in the order of the shooters;
+/// nothing is stored. Returns the kernel samples taken.
+pub fn couple_row<K: Kernel>(
+    kernel: &K,
+    forest: &Forest,
+    receiver: NodeId,
+    shooters: &[NodeId],
+    settings: impl Fn(NodeId, NodeId) -> Option<CoupleSettings>,
+    mut each: impl FnMut(&Link, &[f64]),
+) -> u64 {
+    let (cell, basis) = (&forest.node(receiver).cell, forest.basis_of(receiver));
+    let mut samples = 0;
+    for &shooter in shooters {
+        let Some(settings) = settings(receiver, shooter) else { continue };
+        let from = (&forest.node(shooter).cell, forest.basis_of(shooter));
+        let Some(coupling) = couple(kernel, cell, basis, from.0, from.1, settings) else { continue };
+        samples += u64::from(coupling.kernel_samples);
+        each(&Link::of(receiver, shooter, 0, &coupling), &coupling.block);
+    }
+    samples
 }
 
 /// Pairs that are certainly zero cost next to nothing.

@@ -7,7 +7,7 @@
 
 use crate::couple::CHILDREN;
 use crate::forest::{Forest, NodeId};
-use crate::links::Links;
+use crate::links::{Link, Links};
 use ondelette_numerics::par;
 use ondelette_wavelet::cell::CellShape;
 
@@ -95,11 +95,22 @@ struct Misses<const C: usize> {
 impl<const C: usize> Estimate<C> {
     /// Estimates the error over the roots that `counts` says. Cost linear in links and nodes.
     pub fn of(forest: &Forest, links: &Links, magnitudes: &Magnitudes<C>, counts: impl Fn(u32) -> bool + Sync) -> Self {
+        let rows = |id: NodeId, each: &mut dyn FnMut(&Link)| links.of(id).iter().for_each(each);
+        Self::of_rows(forest, rows, magnitudes, counts)
+    }
+
+    /// The same where links are not all stored: `rows` hands the links of a receiver to a function, in order.
+    pub fn of_rows(
+        forest: &Forest,
+        rows: impl Fn(NodeId, &mut dyn FnMut(&Link)) + Sync,
+        magnitudes: &Magnitudes<C>,
+        counts: impl Fn(u32) -> bool + Sync,
+    ) -> Self {
         let zero = Misses { signed: [[0.0; C]; CHILDREN], square: [0.0; C], absolute: [0.0; CHILDREN] };
         // what each node's own links miss
         let mut misses: Vec<Misses<C>> = par::map(forest.len(), |n| {
             let mut m = zero;
-            for link in links.of(NodeId(n as u32)) {
+            rows(NodeId(n as u32), &mut |link| {
                 let s = link.shooter.index();
                 let mut unsigned = 0.0;
                 let detail = magnitudes.detail(s, link.orders[1]);
@@ -117,7 +128,7 @@ impl<const C: usize> Estimate<C> {
                     }
                 }
                 m.absolute.iter_mut().for_each(|a| *a += unsigned);
-            }
+            });
             m
         });
         // pushed down: a child inherits what its parent misses there

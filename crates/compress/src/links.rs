@@ -29,7 +29,7 @@ pub struct Link {
 }
 
 impl Link {
-    fn of(receiver: NodeId, shooter: NodeId, block: u64, c: &Coupling) -> Self {
+    pub(crate) fn of(receiver: NodeId, shooter: NodeId, block: u64, c: &Coupling) -> Self {
         Link {
             receiver,
             shooter,
@@ -98,6 +98,11 @@ impl Links {
     /// All blocks, one after the other.
     pub fn blocks(&self) -> &[f64] {
         &self.blocks
+    }
+
+    /// Bytes that links and blocks take.
+    pub fn bytes(&self) -> u64 {
+        (size_of_val(&*self.links) + size_of_val(&*self.blocks) + size_of_val(&*self.starts)) as u64
     }
 
     /// Number of links.

@@ -91,10 +91,21 @@ pub fn apply_link<const C: usize>(
     values: &[[f64; C]],
     node: &mut [[f64; C]],
 ) {
+    apply_block(forest, link, &links.blocks()[link.block as usize..], values, node);
+}
+
+/// The same for a link whose block stands at the start of `block`, wherever that is.
+pub fn apply_block<const C: usize>(
+    forest: &Forest,
+    link: &Link,
+    block: &[f64],
+    values: &[[f64; C]],
+    node: &mut [[f64; C]],
+) {
     let rows = forest.basis_of(link.receiver).truncated(usize::from(link.orders[0]));
     let columns = forest.basis_of(link.shooter).truncated(usize::from(link.orders[1]));
     let from = link.shooter.index() * forest.stride();
-    let block = &links.blocks()[link.block as usize..][..rows.len() * columns.len()];
+    let block = &block[..rows.len() * columns.len()];
     for (&i, row) in rows.iter().zip(block.chunks(columns.len())) {
         let mut sum = [0.0; C];
         for (&j, k) in columns.iter().zip(row) {

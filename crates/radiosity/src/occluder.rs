@@ -116,6 +116,16 @@ fn widen(v: Vec3A) -> DVec3 {
 }
 
 impl Occluders {
+    /// Bytes of patches and hierarchies.
+    pub fn bytes(&self) -> u64 {
+        let corners: usize = self.corners.iter().map(|c| size_of_val(c) + size_of_val(&**c)).sum();
+        let wide = size_of_val(&*self.wide.nodes) + size_of_val(&*self.wide.primitive_indices);
+        let binary = &self.binary;
+        let indices = [&binary.primitive_indices, &binary.primitives_to_nodes, &binary.parents];
+        let binary = size_of_val(&*binary.nodes) + indices.map(|i| size_of_val(&**i)).iter().sum::<usize>();
+        (size_of_val(&*self.facets) + corners + wide + binary) as u64
+    }
+
     /// Builds the hierarchy. Cost O(n log n).
     pub fn new(scene: &Scene) -> Self {
         let scale = scene.diagonal();

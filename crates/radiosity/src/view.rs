@@ -166,7 +166,9 @@ pub fn frame_from_inside(scene: &Scene) -> Camera {
                 eye[axis] = low[axis] + height * size[axis];
                 let mut at = middle;
                 at[axis] = low[axis] + 0.45 * size[axis];
-                if eye.distance(at) < 0.05 * size.length() {
+                // straight up or down there is no up
+                let across = (eye - at).reject_from(up).length();
+                if across < 0.05 * size.length() {
                     at[horizontal[0]] = high[horizontal[0]];
                 }
                 let camera = Camera { eye, at, up, fov: 70.0 };

@@ -1,8 +1,8 @@
 //! The space of methods (thesis Fig. 15): whatever links pairs and however the system is solved, the light is the same.
 
 use ondelette_radiosity::ledger::Ledger;
-use ondelette_radiosity::scene::samples;
-use ondelette_radiosity::{Iteration, LinkSettings, Method, Rgb, Scene, Settings, Solution, SolveError, Solver};
+use ondelette_radiosity::scene::{Paint, samples};
+use ondelette_radiosity::{Event, Iteration, LinkSettings, Method, Rgb, Scene, Settings, Solution, SolveError, Solver};
 
 /// Every method with the bases it has.
 const SPACE: [(Method, &str); 10] = [
@@ -245,5 +245,96 @@ fn a_given_subdivision_is_the_one_that_is_solved() {
         let solution = solver.into_solution();
         assert_eq!(solution.forest().leaves(), elements);
         assert!(!solution.is_finished() && solution.statistics().estimated_error > 1e-4);
+    }
+}
+
+#[test]
+fn rows_that_memory_has_no_room_for_change_no_bit() {
+    let scene = room_with_box();
+    for (method, basis) in [(Method::Classical, "haar"), (Method::Galerkin, "m2")] {
+        for iteration in [Iteration::Gmres, Iteration::Jacobi] {
+            let links = LinkSettings { iteration, subdivision: Some(2), ..LinkSettings::default() };
+            let wanted = Settings { links, ..settings(method, basis, 0.3, iteration) };
+            assert!(matches!(Solver::within(scene.clone(), wanted, Some(1)), Err(SolveError::Matrix(_))));
+            // room for the elements, and for a third of the matrix
+            let mut solver = Solver::new(scene.clone(), wanted).unwrap();
+            while solver.step().is_some() {}
+            let cap = solver.counted_bytes() - solver.solution().links().bytes() * 2 / 3;
+            let free = solver.into_solution();
+            let mut solver = Solver::within(scene.clone(), wanted, Some(cap)).unwrap();
+            let mut most = 0;
+            while solver.step().is_some() {
+                most = most.max(solver.counted_bytes());
+            }
+            assert!(most <= cap, "{method} {basis}: {most} bytes of {cap}");
+            let capped = solver.into_solution();
+            assert!(capped.coefficients() == free.coefficients(), "{method} {basis}");
+            assert!(capped.statistics().rays > free.statistics().rays, "no row was coupled twice");
+            assert!(capped.links().is_empty() && Solver::resume(&capped).is_err(), "a part of a matrix is no matrix");
+        }
+    }
+}
+
+#[test]
+fn solvers_that_need_the_whole_matrix_say_what_it_takes() {
+    let scene = room_with_box();
+    let mut solver =
+        Solver::within(scene, settings(Method::Classical, "haar", 0.05, Iteration::Shooting), Some(2_000_000)).unwrap();
+    while solver.step().is_some() {}
+    let statistics = solver.solution().statistics().clone();
+    let too_large = statistics.too_large.unwrap();
+    assert!(!statistics.finished && too_large.bytes > 2_000_000);
+    assert!(too_large.to_string().contains("gmres"), "{too_large}");
+}
+
+#[test]
+fn links_that_adapt_stop_at_the_cap_with_a_solution() {
+    let scene = room_with_box();
+    let wanted = settings(Method::Wavelet, "m2", 0.01, Iteration::Gmres);
+    assert!(matches!(Solver::within(scene.clone(), wanted, Some(1000)), Err(SolveError::Memory { .. })));
+    let cap = 600_000;
+    let mut solver = Solver::within(scene, wanted, Some(cap)).unwrap();
+    while solver.step().is_some() {
+        assert!(solver.counted_bytes() <= cap);
+    }
+    let solution = solver.into_solution();
+    assert!(!solution.is_finished() && solution.statistics().estimated_error < 1.0);
+}
+
+#[test]
+fn links_are_lit_anew_without_a_ray() {
+    let scene = coloured_room();
+    let lamp = scene.materials.iter().find(|m| m.radiance.sum() > 0.0).unwrap().name.clone();
+    let wall = scene.material(scene.sides[2]).name.clone();
+    let paints = [Paint::Emission(lamp, Rgb([0.5, 1.0, 0.7])), Paint::Reflectance(wall, Rgb::grey(0.3))];
+    let mut painted = scene.clone();
+    paints.iter().for_each(|paint| painted.paint(paint).unwrap());
+    use Iteration::{GaussSeidel, Gmres, Jacobi, Shooting, Southwell};
+    for (method, basis, iterations) in [
+        (Method::Classical, "haar", &[Gmres, Shooting][..]),
+        (Method::Galerkin, "m3", &[Jacobi]),
+        (Method::Wavelet, "m2", &[Gmres, GaussSeidel, Southwell]),
+    ] {
+        for &iteration in iterations {
+            let wanted = settings(method, basis, 0.08, iteration);
+            let first = solve(&scene, wanted);
+            let mut solver = Solver::resume(&first).unwrap();
+            solver.relight(&paints).unwrap();
+            let error = loop {
+                if let Some(Event::Solved { error, .. }) = solver.step() {
+                    break error;
+                }
+            };
+            let again = solver.solution();
+            assert_eq!(again.statistics().rays, first.statistics().rays, "{method} {basis}");
+            let fresh = solve(&painted, wanted);
+            let off = difference(&again, &fresh);
+            assert!(off <= error + 0.08 && error < 0.2, "{method} {basis} {iteration}: {off} off, {error} stated");
+            // and finer from there, with rays
+            solver.promise(0.06).unwrap();
+            while solver.step().is_some() {}
+            let finer = solver.into_solution();
+            assert!(finer.is_finished() && difference(&finer, &fresh) <= 0.14, "{method} {basis} {iteration}");
+        }
     }
 }

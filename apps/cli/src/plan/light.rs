@@ -121,6 +121,11 @@ fn parsed<T: FromStr<Err: Display>>(flag: &str, value: &str) -> Result<T, Refusa
     value.parse().map_err(|e| Refusal::new(format!("{flag}: {e}")))
 }
 
+/// Why direct light cannot be gathered anew.
+pub(crate) fn needs_samples(method: Method) -> String {
+    format!("it needs the lamps that --method sampled (the default) keeps; with --method {method}, leave it out")
+}
+
 /// What the solver is told.
 fn settings(args: &LightArgs) -> Result<Settings, Refusal> {
     let method: Method = parsed("--method", &args.method)?;
@@ -210,20 +215,17 @@ impl LightPlan {
             report: args.report.clone(),
         };
         let method = plan.settings.method;
-        if (plan.keep || plan.exact) && method != Method::Sampled {
-            let flag = if plan.keep { "--keep-links" } else { "--direct gather" };
-            return Err(Refusal::new(format!(
-                "{flag} needs the samples of --method sampled; with --method {method}, leave it out"
-            )));
+        if plan.exact && method.has_links() {
+            return Err(Refusal::new(format!("--direct gather: {}", needs_samples(method))));
         }
         plan.check_outputs()?;
         Ok(plan)
     }
 
-    /// Refuses outputs that cannot be written, and samples to be kept nowhere.
+    /// Refuses outputs that cannot be written, and samples or links to be kept nowhere.
     fn check_outputs(&self) -> Result<(), Refusal> {
         if self.keep && !self.named.iter().any(|o| o.kind == Kind::Solution) {
-            return Err(Refusal::new("--keep-links: samples are kept in a solution file; add -o NAME.onl"));
+            return Err(Refusal::new("--keep-links: they are kept in a solution file; add -o NAME.onl"));
         }
         Outputs { files: self.named.clone(), report: self.report.clone() }.check(&self.scene)
     }

@@ -5,7 +5,7 @@ use crate::interrupt::{Reason, Stop};
 use crate::plan::light::{DEFAULT_FOLDER, Kind, LightPlan, Outputs};
 use crate::plan::values::CameraRequest;
 use crate::progress::Progress;
-use crate::report::{Record, Stages};
+use crate::report::{Memory, Record, Stages};
 use ondelette_io::onl::write_solution;
 use ondelette_io::write::{
     LitModel, ModelPainter, ToneMap, create_folder, elements_path, scene_tone, write_bytes, write_exr, write_glb,
@@ -16,7 +16,7 @@ use ondelette_numerics::par;
 use ondelette_radiosity::ledger::Ledger;
 use ondelette_radiosity::scene::{Camera, Shape};
 use ondelette_radiosity::view::{Renderer, frame_from_inside};
-use ondelette_radiosity::{Scene, Solver};
+use ondelette_radiosity::{Event, Scene, Solver};
 use ondelette_wavelet::cell::CellFamily;
 
 /// Pixels of a picture.
@@ -51,34 +51,37 @@ fn light(plan: &LightPlan, stop: Stop) -> Result<Outcome, Refusal> {
     let camera = outputs.files.iter().any(|o| is_drawn(o.kind)).then(|| camera(&scene, plan.camera));
     let camera = camera.transpose()?;
 
-    let mut solver = Solver::new(scene, plan.settings)?;
-    if let Some(bytes) = plan.memory {
-        solver.limit_memory(bytes)?;
-    }
+    let mut solver = Solver::within(scene, plan.settings, plan.memory)?;
     if plan.uses_default_folder() {
         create_folder(DEFAULT_FOLDER.as_ref())?;
     }
     outputs.check(&plan.scene)?;
-    let mut stopped = None;
+    let (mut stopped, mut counted) = (None, 0);
     loop {
         stopped = stopped.or(stop.asked());
         if stopped.is_some() {
             break;
         }
-        match solver.step() {
-            Some(event) => progress.solving(event),
-            None => break,
-        }
+        let Some(event) = solver.step() else { break };
+        progress.solving(event);
+        counted = most_counted(counted, &solver, event);
     }
     stages.end("solve");
-    let record = finish(plan, solver, stopped, stages, &outputs, camera, stop, progress)?;
+    let record = finish(plan, solver, counted, stopped, stages, &outputs, camera, stop, progress)?;
     Ok(record)
 }
 
-/// Everything after the solver's last step: files, ledger, picture, report, summary.
+/// The most bytes counted so far. Looked at once a balance: memory changes little in between.
+pub(super) fn most_counted(until_now: u64, solver: &Solver, event: Event) -> u64 {
+    if matches!(event, Event::Solved { .. }) { until_now.max(solver.counted_bytes()) } else { until_now }
+}
+
+/// Everything after the solver's last step, of which `counted` bytes are the most that were held until then: files,
+/// ledger, picture, report, summary.
 pub(super) fn finish(
     plan: &LightPlan,
     solver: Solver,
+    counted: u64,
     stopped: Option<Reason>,
     stages: Stages,
     outputs: &Outputs,
@@ -86,12 +89,17 @@ pub(super) fn finish(
     stop: Stop,
     mut progress: Progress,
 ) -> Result<Outcome, Refusal> {
+    let memory = Memory { counted: counted.max(solver.counted_bytes()), scene: solver.scene_bytes() };
     let solution = if plan.keep || plan.exact { solver.into_kept() } else { solver.into_solution() };
-    if (plan.keep || plan.exact) && solution.kept().is_none() {
+    let is_sampled = !solution.settings().method.has_links();
+    if (plan.keep || plan.exact) && is_sampled && solution.kept().is_none() {
         tell("note: stopped in the middle of a refinement: the samples are not kept");
     }
 
-    let mut record = Record { plan, solution: &solution, ledger: None, stopped, stages, written: Vec::new() };
+    if plan.keep && !is_sampled && solution.links().is_empty() {
+        tell("note: --memory has no room for all links: they are not kept");
+    }
+    let mut record = Record { plan, solution: &solution, memory, ledger: None, stopped, stages, written: Vec::new() };
     write_outputs(&mut record, outputs, camera, stop, &mut progress)?;
     progress.finish();
     if let Some(path) = &outputs.report {

@@ -1,9 +1,9 @@
 //! `ondelette relight`: read a solution, paint its materials, balance, and spend rays only if asked to.
 
-use super::light::{camera, finish, is_drawn};
+use super::light::{camera, finish, is_drawn, most_counted};
 use super::{Outcome, Refusal};
 use crate::interrupt::Stop;
-use crate::plan::light::RelightPlan;
+use crate::plan::light::{RelightPlan, needs_samples};
 use crate::progress::Progress;
 use crate::report::Stages;
 use ondelette_io::onl::read_solution;
@@ -38,7 +38,10 @@ fn relight(plan: RelightPlan, stop: Stop) -> Result<Outcome, Refusal> {
     let camera = outputs.files.iter().any(|o| is_drawn(o.kind)).then(|| camera(solver.scene(), light.camera));
     let camera = camera.transpose()?;
     let mut progress = Progress::new(settings.error);
-    let mut stopped = None;
+    if light.exact && settings.method.has_links() {
+        return Err(Refusal::new(format!("--direct gather: {}", needs_samples(settings.method))));
+    }
+    let (mut stopped, mut counted) = (None, 0);
     loop {
         stopped = stopped.or(stop.asked());
         if stopped.is_some() {
@@ -46,10 +49,11 @@ fn relight(plan: RelightPlan, stop: Stop) -> Result<Outcome, Refusal> {
         }
         let Some(event) = solver.step() else { break };
         progress.solving(event);
+        counted = most_counted(counted, &solver, event);
         if matches!(event, Event::Solved { .. }) && !plan.refine {
             break;
         }
     }
     stages.end("solve");
-    finish(&light, solver, stopped, stages, &outputs, camera, stop, progress)
+    finish(&light, solver, counted, stopped, stages, &outputs, camera, stop, progress)
 }

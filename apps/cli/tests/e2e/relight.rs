@@ -38,6 +38,7 @@ fn what_cannot_be_lit_anew_is_refused() {
     room(&place);
     place.run("light room.obj --error 5% -o bare.onl").with_code(0);
     place.run("light room.obj --error 5% --keep-links -o room.onl").with_code(0);
+    place.run("light room.obj --error 5% --method wavelet -o linked.onl").with_code(0);
     let before = place.names();
     for (arguments, said) in [
         ("relight bare.onl --emission lamp=1 -o x.onl", "--keep-links"),
@@ -51,8 +52,9 @@ fn what_cannot_be_lit_anew_is_refused() {
         ("relight room.onl --emission lamp=1 --keep-links -o x.png", "add -o NAME.onl"),
         ("light room.obj --keep-links -o x.png", "add -o NAME.onl"),
         ("light room.obj --memory 1 -o x.png", "512MB"),
-        ("light room.obj --method wavelet --memory 1GB -o x.png", "--method sampled"),
-        ("light room.obj --method wavelet --keep-links -o x.onl", "--method sampled"),
+        ("light room.obj --method wavelet --keep-links -o x.png", "add -o NAME.onl"),
+        ("light room.obj --method classical --subdivision 9 --solver southwell --memory 1MB -o x.png", "gmres"),
+        ("relight linked.onl --emission lamp=1 --direct gather -o x.png", "--method sampled"),
         ("light room.obj --method wavelet --direct gather -o x.png", "--method sampled"),
         ("light room.obj --light at=0,0 -o x.png", "three numbers"),
     ] {
@@ -72,4 +74,58 @@ fn a_dark_scene_gets_a_lamp() {
     place.run(&format!("light dark.obj --error 5% {lamp} -o x.onl --report x.json")).with_code(0);
     let emitted = report(&place, "x.json")["ledger"]["emitted"][0].as_f64().unwrap();
     assert!((emitted - 1.6 * std::f64::consts::PI).abs() < 1e-9, "{emitted}");
+}
+
+#[test]
+fn links_are_kept_and_lit_anew() {
+    let place = Place::new();
+    room(&place);
+    for method in ["wavelet", "galerkin"] {
+        place.run(&format!("light room.obj --error 5% --method {method} -o a.onl --report a.json")).with_code(0);
+        place.run("relight a.onl --emission lamp=6,4,2 -o b.onl -o b.png -o b.glb --report b.json").with_code(0);
+        let [first, twice] = ["a.json", "b.json"].map(|name| report(&place, name));
+        assert_eq!(first["rays"], twice["rays"], "{method}");
+        let absorbed = |r: &Value| r["ledger"]["absorbed"][1].as_f64().unwrap();
+        assert!((absorbed(&twice) / absorbed(&first) - 2.0).abs() < 0.02, "{method}");
+        // what was lit anew can be lit anew
+        let outputs = "-o c.onl --report c.json";
+        place.run(&format!("relight b.onl --reflectance grey=0.3 --refine --error 3% {outputs}")).with_code(0);
+        assert!(report(&place, "c.json")["estimated_error"].as_f64().unwrap() <= 0.03, "{method}");
+    }
+    // a matrix that memory has no room for is solved all the same, but not kept
+    let capped = "light room.obj --error 3% --method classical --subdivision 4 --memory 1.5MB";
+    let ended = place.run(&format!("{capped} --keep-links -o d.onl --report d.json"));
+    let d = report(&place, "d.json");
+    let counted = d["memory"]["counted_bytes"].as_u64().unwrap();
+    assert!(counted <= 1_500_000 && ended.err.contains("no room for all links"), "{counted} {}", ended.err);
+    assert!(place.run("relight d.onl --emission lamp=1 -o x.onl").with_code(2).err.contains("--memory"));
+}
+
+/// The most memory that this process of Linux may be said to use beside what the solver counts: the program itself.
+#[cfg(target_os = "linux")]
+const PROGRAM: u64 = 12_000_000;
+
+#[test]
+#[cfg(target_os = "linux")]
+fn memory_stays_below_the_cap_and_what_the_scene_takes() {
+    let place = Place::new();
+    let mut most_free = 0;
+    for (cap, error) in [(None, "0.6%"), (Some(16), "0.6%"), (Some(8), "0.6%")] {
+        let flag = cap.map_or(String::new(), |cap| format!("--memory {cap}MB"));
+        place.run(&format!("light builtin:cornell --error {error} {flag} -o a.onl --report a.json"));
+        let r = report(&place, "a.json");
+        let bytes = |path: &str| r.pointer(path).and_then(Value::as_u64).unwrap();
+        let (peak, counted, scene) =
+            (bytes("/peak_memory_bytes"), bytes("/memory/counted_bytes"), bytes("/memory/scene_bytes"));
+        assert!(scene > 1000);
+        match cap {
+            None => most_free = counted,
+            Some(cap) => {
+                let cap = cap * 1_000_000;
+                assert!(counted <= cap * 11 / 10 && cap < most_free, "{counted} of {cap}, {most_free} if free");
+                let allowed = (cap + scene) * 11 / 10 + PROGRAM;
+                assert!(peak <= allowed, "peak {peak}, allowed {allowed}");
+            }
+        }
+    }
 }

@@ -84,6 +84,13 @@ impl LightKernel {
         LightKernel { sides, occluders, covers, of_patch, rays: AtomicU64::new(0), present: None }
     }
 
+    /// Bytes of sides, patches and ray structure.
+    pub fn bytes(&self) -> u64 {
+        let covers: usize = self.covers.iter().map(|c| size_of_val(c) + size_of_val(&**c)).sum();
+        let own = size_of_val(&*self.sides) + size_of_val(&*self.of_patch) + covers;
+        own as u64 + self.occluders.bytes()
+    }
+
     /// The sides, in scene order.
     pub fn sides(&self) -> &[SideFrame] {
         &self.sides

@@ -35,6 +35,11 @@ impl Sampled {
         (self.forest.len() * node + gathers) as u64
     }
 
+    /// Bytes of scene and rays.
+    pub(crate) fn scene_bytes(&self) -> u64 {
+        self.scene.bytes() + self.kernel.bytes()
+    }
+
     /// Bytes of the first samples of all points, drawn or not.
     fn first_bytes(&self) -> u64 {
         let points: u64 = self.gathers.iter().map(|g| u64::from(g.points())).sum();

@@ -241,6 +241,17 @@ pub struct Scene {
 }
 
 impl Scene {
+    /// Bytes that it takes.
+    pub fn bytes(&self) -> u64 {
+        let names = |length: usize| length + size_of::<String>();
+        let materials = self.materials.iter().map(|m| size_of::<Material>() + m.name.len()).sum::<usize>();
+        let objects = self.objects.iter().map(|o| size_of::<Object>() + o.name.len()).sum::<usize>();
+        let patches =
+            self.patches.iter().map(|p| size_of::<Patch>() + size_of_val(&*p.provenance.faces)).sum::<usize>();
+        let warnings = self.warnings.iter().map(|w| names(w.len())).sum::<usize>();
+        (size_of::<Scene>() + materials + objects + patches + size_of_val(&*self.sides) + warnings) as u64
+    }
+
     /// Material of a side.
     pub fn material(&self, side: Side) -> &Material {
         &self.materials[self.patches[side.patch as usize].material as usize]

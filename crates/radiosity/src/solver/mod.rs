@@ -95,16 +95,13 @@ pub enum SolveError {
         /// What it takes.
         least: u64,
     },
-    /// A cap where nothing is counted.
-    #[error("memory is capped with the sampled method only: leave --memory out, or choose --method sampled")]
-    NoMemoryCap,
     /// A material cannot be painted so.
     #[error(transparent)]
     Paint(#[from] crate::scene::PaintError),
-    /// A solution without samples to go on from.
+    /// A solution without samples or links to go on from.
     #[error(
-        "the solution of '{0}' did not keep its samples, so there is nothing to go on from: \
-         solve it again with the sampled method (the default) and --keep-links"
+        "the solution of '{0}' kept neither samples nor links, so there is nothing to go on from: \
+         solve it again with --keep-links; methods with links keep them unless --memory has no room for all"
     )]
     NothingKept(String),
 }
@@ -133,34 +130,62 @@ impl Solver {
     /// # Errors
     /// See [`SolveError`].
     pub fn new(scene: Scene, settings: Settings) -> Result<Self, SolveError> {
+        Self::within(scene, settings, None)
+    }
+
+    /// The same with a cap on the counted bytes, if any: see [`Solver::limit_memory`].
+    ///
+    /// # Errors
+    /// See [`SolveError`].
+    ///
+    /// ```
+    /// use ondelette_radiosity::{Method, Settings, Solver, scene::samples};
+    /// let links = ondelette_radiosity::LinkSettings { subdivision: Some(3), ..Default::default() };
+    /// let settings = Settings { method: Method::Classical, basis: "haar".parse().unwrap(), links, error: 0.1 };
+    /// let scene = || samples::facing_squares(1.0);
+    /// let light = |cap| {
+    ///     let mut solver = Solver::within(scene(), settings, cap)?;
+    ///     while solver.step().is_some() {}
+    ///     Ok::<_, ondelette_radiosity::SolveError>(solver.solution().coefficients().to_vec())
+    /// };
+    /// // half of the matrix does not fit: its rows are coupled anew in every sweep, to the same bits
+    /// assert!(light(None)? == light(Some(500_000))?);
+    /// # Ok::<(), ondelette_radiosity::SolveError>(())
+    /// ```
+    pub fn within(scene: Scene, settings: Settings, bytes: Option<u64>) -> Result<Self, SolveError> {
         let settings = settings.validated()?;
         if !scene.has_emitter() {
             return Err(SolveError::NoEmitter(scene.name));
         }
-        Ok(Solver(match settings.method {
+        let mut solver = Solver(match settings.method {
             Method::Sampled => Engine::Sampled(Box::new(Sampled::new(scene, settings)?)),
-            _ => Engine::Linked(Box::new(Linked::new(scene, settings)?)),
-        }))
+            _ => return Ok(Solver(Engine::Linked(Box::new(Linked::new(scene, settings, bytes)?)))),
+        });
+        bytes.map_or(Ok(()), |bytes| solver.limit_memory(bytes))?;
+        Ok(solver)
     }
 
-    /// Goes on from a solution that kept its samples ([`Solver::into_kept`]): no ray is cast before the first
-    /// [`Event::Solved`].
+    /// Goes on from a solution that kept its samples ([`Solver::into_kept`]) or has links: no ray is cast before the
+    /// first [`Event::Solved`].
     ///
     /// # Errors
     /// [`SolveError::NothingKept`].
     pub fn resume(solution: &Solution) -> Result<Self, SolveError> {
-        let engine = Sampled::resume(solution);
-        let engine = engine.ok_or_else(|| SolveError::NothingKept(solution.scene().name.clone()))?;
-        Ok(Solver(Engine::Sampled(Box::new(engine))))
+        let engine = if solution.settings().method.has_links() {
+            Linked::resume(solution).map(|engine| Engine::Linked(Box::new(engine)))
+        } else {
+            Sampled::resume(solution).map(|engine| Engine::Sampled(Box::new(engine)))
+        };
+        engine.map(Solver).ok_or_else(|| SolveError::NothingKept(solution.scene().name.clone()))
     }
 
-    /// Lights the scene anew: materials emit or reflect something else, the samples stay. The next [`Event::Solved`]
+    /// Lights the scene anew: materials emit or reflect something else, the samples or links stay. The next [`Event::Solved`]
     /// states the new error; steps after that spend the rays that are missing to the promise.
     ///
-    /// **Cost** to that event some sweeps over the samples; no ray.
+    /// **Cost** to that event some sweeps over the samples or links; no ray.
     ///
     /// # Errors
-    /// [`SolveError::Paint`], and [`SolveError::NothingKept`] with links. The solver is then as it was.
+    /// [`SolveError::Paint`]; the solver is then as it was.
     ///
     /// ```
     /// use ondelette_radiosity::{Event, Rgb, Settings, Solver, scene::{Paint, samples}};
@@ -176,45 +201,57 @@ impl Solver {
     /// ```
     pub fn relight(&mut self, paints: &[Paint]) -> Result<(), SolveError> {
         match &mut self.0 {
-            Engine::Linked(engine) => Err(SolveError::NothingKept(engine.scene().name.clone())),
+            Engine::Linked(engine) => Ok(engine.paint(paints)?),
             Engine::Sampled(engine) => Ok(engine.paint(paints)?),
         }
     }
 
     /// Caps the counted bytes of elements, samples and working arrays (the scene and its ray structure come on top).
     /// Samples that do not fit are drawn again whenever they are read: the answer stays within the promise, the time
-    /// grows. Where not even elements fit, the solver stops, and [`crate::Statistics::finished`] is false.
+    /// grows. So do rows of a full matrix with the solvers gmres and jacobi. Where not even elements fit, or links that
+    /// adapt do not, the solver stops, and [`crate::Statistics::finished`] is false. Call it before the first step.
     ///
     /// # Errors
-    /// [`SolveError::Memory`] if the first elements alone take more; [`SolveError::NoMemoryCap`] with links.
+    /// [`SolveError::Memory`] if the first elements or links alone take more; [`SolveError::Matrix`] if that is a full
+    /// matrix.
     pub fn limit_memory(&mut self, bytes: u64) -> Result<(), SolveError> {
         match &mut self.0 {
-            Engine::Linked(_) => Err(SolveError::NoMemoryCap),
+            Engine::Linked(engine) => engine.limit_memory(bytes),
             Engine::Sampled(engine) => engine.limit_memory(bytes),
         }
     }
 
-    /// Counted bytes of elements, samples and working arrays; nothing is counted with links.
-    pub fn counted_bytes(&self) -> Option<u64> {
+    /// Counted bytes of elements, samples or links, and working arrays.
+    pub fn counted_bytes(&self) -> u64 {
         match &self.0 {
-            Engine::Linked(_) => None,
-            Engine::Sampled(engine) => Some(engine.bytes()),
+            Engine::Linked(engine) => engine.bytes(),
+            Engine::Sampled(engine) => engine.bytes(),
+        }
+    }
+
+    /// Bytes of the scene and its ray structure, which no cap counts.
+    pub fn scene_bytes(&self) -> u64 {
+        match &self.0 {
+            Engine::Linked(engine) => engine.scene_bytes(),
+            Engine::Sampled(engine) => engine.scene_bytes(),
         }
     }
 
     /// Promises another error (a fraction), for a solver that was resumed; it goes on from what it has.
     ///
     /// # Errors
-    /// The error is no fraction that can be promised; the solver has links.
+    /// The error is no fraction that can be promised.
     pub fn promise(&mut self, error: f64) -> Result<(), SolveError> {
+        let settings = match &self.0 {
+            Engine::Linked(engine) => engine.settings(),
+            Engine::Sampled(engine) => engine.settings(),
+        };
+        let error = Settings { error, ..settings }.validated()?.error;
         match &mut self.0 {
-            Engine::Linked(engine) => Err(SolveError::NothingKept(engine.scene().name.clone())),
-            Engine::Sampled(engine) => {
-                let settings = Settings { error, ..engine.settings() }.validated()?;
-                engine.promise(settings.error);
-                Ok(())
-            }
+            Engine::Linked(engine) => engine.promise(error),
+            Engine::Sampled(engine) => engine.promise(error),
         }
+        Ok(())
     }
 
     /// The scene being solved.

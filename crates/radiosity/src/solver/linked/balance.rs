@@ -5,6 +5,7 @@
 //! shoot. A shot from a set S of elements adds U on S to B, hence K U to E and rho K U to U, and clears U on S.
 //! All orders are fixed, and ties go to the lower index: the result does not depend on the number of threads.
 
+use super::memory::CAPPED_RESTART;
 use super::{Event, Linked};
 use crate::rgb::Rgb;
 use crate::settings::Iteration;
@@ -144,7 +145,7 @@ impl Linked {
     }
 
     /// The residual at which this solve ends: that which a first, coarse balance needs, or that of the promise.
-    fn wanted(&self) -> f64 {
+    pub(super) fn wanted(&self) -> f64 {
         let tolerance =
             if self.strict { self.settings.error } else { self.settings.error.max(0.3 * self.error.min(0.3)) };
         0.1 * tolerance * (1.0 - self.highest_reflectance())
@@ -178,7 +179,8 @@ impl Linked {
         gmres.supply(product);
         self.statistics.iterations += 1;
         let residual = self.relative(gmres.residual());
-        if gmres.steps() >= RESTART {
+        let restart = if self.cap.is_some() { CAPPED_RESTART } else { RESTART };
+        if gmres.steps() >= restart {
             self.irradiance = gmres.solution();
             self.start_solving();
         } else {
@@ -299,6 +301,7 @@ impl Linked {
         self.irradiance = result;
         self.statistics.iterations += 1;
         self.statistics.residual = residual;
+        self.statistics.rays = self.rays_before + self.kernel.rays_cast();
         if self.standard.is_some() { self.conclude() } else { self.judge() }
     }
 }

@@ -51,6 +51,7 @@ impl Guess {
 }
 
 /// What is known of every element when a full matrix is coupled.
+#[derive(Clone)]
 pub(super) struct Elements {
     centres: Vec<DVec3>,
     areas: Vec<f64>,

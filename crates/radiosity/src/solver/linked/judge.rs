@@ -4,7 +4,9 @@ use super::guess::rays_for;
 use super::{DEEPEST, Event, Linked, Phase};
 use crate::rgb::Rgb;
 use crate::settings::{Decomposition, Oracle, Weight};
-use ondelette_compress::{Change, CoupleSettings, End, Estimate, Judgement, Link, Magnitudes, Refinement, transport};
+use ondelette_compress::{
+    Change, CoupleSettings, End, Estimate, Judgement, Link, Magnitudes, NodeId, Refinement, transport,
+};
 
 /// Fewest rays of a receiver point in the last look at a masked pair.
 const LEAST_LAST_RAYS: usize = 32;
@@ -44,7 +46,8 @@ impl Linked {
         let mut values = self.radiosity(&self.irradiance, true);
         transport::pull(&self.forest, &mut values);
         let magnitudes = Magnitudes::of(&self.forest, &values, self.is_graded());
-        let estimate = Estimate::of(&self.forest, &self.links, &magnitudes, |root| self.counts(root));
+        let rows = |id: NodeId, each: &mut dyn FnMut(&Link)| self.row(id, each);
+        let estimate = Estimate::of_rows(&self.forest, rows, &magnitudes, |root| self.counts(root));
         let mean = self.mean_irradiance();
         let whole = mean.sum() * self.counted_area;
         // a bias is carried on by every reflection, scatter is not; and the equations are only solved so far
@@ -63,7 +66,7 @@ impl Linked {
 
     /// After a balance of a full matrix: done, tighten the solve, or halve the elements.
     fn proceed_uniformly(&mut self) {
-        let decomposes = self.settings.links.decomposition == Decomposition::Standard;
+        let decomposes = self.settings.links.decomposition == Decomposition::Standard && !self.resumed;
         let enough = if decomposes { 1.0 - super::standard::SHARE } else { 1.0 };
         if self.error > enough * self.settings.error {
             self.halve_elements();
@@ -138,7 +141,7 @@ impl Linked {
                 Change::Raise(_) => true,
             }
         };
-        let most = (self.links.len() / 2).max(64);
+        let most = (self.links.len() / 2).max(64).min(self.room_for_changes());
         let chosen = if self.settings.links.oracle == Oracle::Error {
             let wanted = (estimate.total - 0.5 * target).min(0.6 * estimate.total).max(0.2 * estimate.total);
             judgement.largest(wanted, most, may)

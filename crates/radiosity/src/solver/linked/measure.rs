@@ -12,6 +12,7 @@ impl Linked {
             Some(standard) => standard.apply(&self.forest, values, result),
             None => transport::apply(&self.forest, &self.links, values, result),
         }
+        self.receive_openly(values, result);
     }
 
     /// Exitance (if asked for) plus reflectance times irradiance at the leaves.

@@ -11,10 +11,12 @@
 //! ([`uniform`]), and the standard decomposition compresses such a matrix ([`standard`]). [`balance`] solves the linear
 //! system; [`measure`] integrates; [`guess`] says how many rays a pair gets.
 
+mod again;
 mod balance;
 mod guess;
 mod judge;
 mod measure;
+mod memory;
 mod standard;
 mod uniform;
 
@@ -25,12 +27,15 @@ use crate::settings::Settings;
 use crate::solution::{Solution, Statistics};
 use balance::Balance;
 use guess::Guess;
+use memory::OpenRows;
 use ondelette_compress::{Forest, Links, NodeId, Refinement, Standard, Task, transport};
 use std::sync::Arc;
 pub use uniform::MatrixTooLarge;
 use uniform::{Uniform, Weaving};
 
 enum Phase {
+    /// A solve on the links as they are is next.
+    Beginning,
     Linking(Refinement),
     /// Coupling all pairs of a full matrix.
     Weaving(Weaving),
@@ -56,6 +61,13 @@ pub(super) struct Linked {
     uniform: Option<Uniform>,
     /// The full matrix in its standard decomposition, once it is there: used in place of the links.
     standard: Option<Standard>,
+    /// Rows of a full matrix that memory has no room for.
+    open: Option<OpenRows>,
+    /// Counted bytes that may be taken.
+    cap: Option<u64>,
+    /// Whether it goes on from the links of a solution, and the rays that these took.
+    resumed: bool,
+    rays_before: u64,
     /// Whether the present solve goes to the final tolerance.
     strict: bool,
     /// Area of the sides that the promise counts.
@@ -81,12 +93,18 @@ const FIRST_ORDERS: [u8; 2] = [3, 3];
 /// Deepest split.
 const DEEPEST: u32 = 16;
 
+/// Area of the sides that the promise counts.
+fn counted_area(scene: &Scene, kernel: &LightKernel) -> f64 {
+    let counted = scene.sides.iter().zip(kernel.sides()).filter(|(s, _)| !scene.material(**s).is_pure_emitter());
+    counted.map(|(_, frame)| frame.area).sum()
+}
+
 impl Linked {
     /// Prepares a scene. Nothing is linked yet.
     ///
     /// # Errors
     /// See [`SolveError`].
-    pub(super) fn new(scene: Scene, settings: Settings) -> Result<Self, SolveError> {
+    pub(super) fn new(scene: Scene, settings: Settings, cap: Option<u64>) -> Result<Self, SolveError> {
         if scene.sides.len() > MOST_SIDES {
             return Err(SolveError::TooManySides { sides: scene.sides.len(), most: MOST_SIDES });
         }
@@ -96,11 +114,23 @@ impl Linked {
         for side in kernel.sides() {
             forest.add_root(side.shape, side.area);
         }
+        let mut engine = Self::at_the_start(Arc::new(scene), settings, kernel, forest);
+        engine.cap = cap;
+        if settings.is_uniform() {
+            engine.start_weaving(settings.links.subdivision.map(u32::from))?;
+        } else {
+            engine.phase = Phase::Linking(Refinement::linking(engine.pairs_of_sides()));
+            cap.map_or(Ok(()), |cap| engine.limit_memory(cap))?;
+        }
+        Ok(engine)
+    }
+
+    /// No links and no light yet.
+    fn at_the_start(scene: Arc<Scene>, settings: Settings, kernel: LightKernel, forest: Forest) -> Self {
         let irradiance = vec![[0.0; 3]; forest.len() * forest.stride()];
-        let counted = scene.sides.iter().zip(kernel.sides()).filter(|(s, _)| !scene.material(**s).is_pure_emitter());
-        let counted_area = counted.map(|(_, frame)| frame.area).sum();
-        let mut engine = Linked {
-            scene: Arc::new(scene),
+        let counted_area = counted_area(&scene, &kernel);
+        Linked {
+            scene,
             settings,
             kernel,
             forest,
@@ -109,6 +139,10 @@ impl Linked {
             phase: Phase::Finished,
             uniform: None,
             standard: None,
+            open: None,
+            cap: None,
+            resumed: false,
+            rays_before: 0,
             strict: false,
             counted_area,
             whole: 0.0,
@@ -116,13 +150,7 @@ impl Linked {
             renewed: false,
             error: f64::INFINITY,
             statistics: Statistics::default(),
-        };
-        if settings.is_uniform() {
-            engine.start_weaving(settings.links.subdivision.map(u32::from))?;
-        } else {
-            engine.phase = Phase::Linking(Refinement::linking(engine.pairs_of_sides()));
         }
-        Ok(engine)
     }
 
     /// All pairs of sides that face each other.
@@ -152,6 +180,11 @@ impl Linked {
     /// ([`Statistics::finished`] says which).
     pub(super) fn step(&mut self) -> Option<Event> {
         match std::mem::replace(&mut self.phase, Phase::Finished) {
+            Phase::Beginning => {
+                self.start_solving();
+                let (iterations, wanted) = (self.statistics.iterations, self.wanted());
+                Some(Event::Iterated { iterations, residual: 1.0, wanted })
+            }
             Phase::Linking(batch) => {
                 Some(self.work(batch, |done, total| Event::Linking { done, total }, Phase::Linking))
             }
@@ -168,13 +201,14 @@ impl Linked {
         }
     }
 
-    /// The state as it stands, valid after any step.
+    /// The state as it stands, valid after any step. Links of which only a part is stored are left out.
     pub(super) fn solution(&self) -> Solution {
+        let links = if self.open.is_some() { Links::new() } else { self.links.clone() };
         Solution::new(
             self.scene.clone(),
             self.settings,
             self.forest.clone(),
-            self.links.clone(),
+            links,
             self.irradiance.clone(),
             self.present_statistics(),
         )
@@ -183,7 +217,8 @@ impl Linked {
     /// The state as it stands, without a copy: for the end.
     pub(super) fn into_solution(self) -> Solution {
         let statistics = self.present_statistics();
-        Solution::new(self.scene, self.settings, self.forest, self.links, self.irradiance, statistics)
+        let links = if self.open.is_some() { Links::new() } else { self.links };
+        Solution::new(self.scene, self.settings, self.forest, links, self.irradiance, statistics)
     }
 
     fn present_statistics(&self) -> Statistics {
@@ -201,7 +236,7 @@ impl Linked {
     ) -> Event {
         let (finished, samples) = batch.step(&self.kernel, &self.forest, WORK_A_STEP);
         self.statistics.kernel_samples += samples;
-        self.statistics.rays = self.kernel.rays_cast();
+        self.statistics.rays = self.rays_before + self.kernel.rays_cast();
         let event = event(batch.done(), batch.len());
         if !finished {
             self.phase = phase(batch);
