@@ -1,5 +1,6 @@
-//! `cargo xtask bench light`: the scenes of bench/scenes lit to several tolerances: what it costs, how good it is.
+//! `cargo xtask bench light`: scenes lit to several tolerances: what it costs, how good it is, how it grows.
 
+use crate::office::office;
 use serde_json::Value;
 use std::collections::HashMap;
 use std::fs;
@@ -9,52 +10,159 @@ use std::time::Instant;
 
 const SCENES: [&str; 2] = ["cornell", "two_room"];
 const ERRORS: [&str; 3] = ["5%", "2%", "1%"];
-/// Runs of each line; the median counts.
+/// Stations of the generated offices, and the errors that they are lit to; the first of them shows the growth.
+const OFFICES: [(usize, &[&str]); 3] = [(3, &["5%", "2%", "1%"]), (36, &["5%", "2%", "1%"]), (366, &["5%"])];
+/// Runs of each line on small scenes; the median counts.
 const RUNS: usize = 3;
 /// Points of a reference cell along an axis.
 const POINTS: usize = 4;
 
-/// Builds the program and prints the table.
-pub(crate) fn light(root: &Path) -> Result<(), String> {
+/// How much is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Extent {
+    /// All of it.
+    Full,
+    /// No run of more than some seconds: the largest office and its tighter tolerances are left out.
+    Quick,
+}
+
+/// The program, and a folder for what it writes.
+struct Bench {
+    program: PathBuf,
+    folder: PathBuf,
+}
+
+/// What a run took.
+#[derive(Clone, Copy, Debug)]
+struct Cost {
+    cpu: f64,
+    wall: f64,
+}
+
+/// Builds the program and prints the tables.
+pub(crate) fn light(root: &Path, extent: Extent) -> Result<(), String> {
     let mut build = Command::new("cargo");
     build.args(["build", "--quiet", "--release", "-p", "ondelette"]).current_dir(root);
     finish(&mut build)?;
-    let program = root.join("target/release/ondelette");
-    let folder = root.join("target/bench");
-    fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
-    println!("CPU and wall seconds: `light`, median of {RUNS} runs; memory: peak of the process.");
+    let bench = Bench { program: root.join("target/release/ondelette"), folder: root.join("target/bench") };
+    fs::create_dir_all(&bench.folder).map_err(|e| format!("{}: {e}", bench.folder.display()))?;
+    println!("CPU and wall seconds: `light`, median of {RUNS} runs, offices of one; memory: peak of the process.");
     println!("error: of cell means, against bench/scenes; verify: point by point, by `ondelette verify`, at most.");
-    println!("scene       asked     CPU s    wall s   memory    error   verify (95 %)");
+    println!("scene        quads   asked     CPU s    wall s   memory    error   verify (95 %)");
     for scene in SCENES {
         let file = root.join(format!("bench/scenes/{scene}.obj"));
         let reference = Reference::read(&root.join(format!("bench/scenes/{scene}.csv")))?;
         for error in ERRORS {
-            let (onl, report) = (folder.join(format!("{scene}.onl")), folder.join(format!("{scene}.json")));
-            let mut costs: Vec<(f64, f64)> = Vec::new();
-            for _ in 0..RUNS {
-                let mut run = Command::new(&program);
-                run.arg("light").arg(&file).args(["--error", error, "-o"]).arg(&onl).arg("--report").arg(&report);
-                let (start, before) = (Instant::now(), children_seconds());
-                finish(&mut run)?;
-                costs.push((children_seconds() - before, start.elapsed().as_secs_f64()));
-            }
-            let median = |mut all: Vec<f64>| {
-                all.sort_by(f64::total_cmp);
-                all[all.len() / 2]
-            };
-            let cpu = median(costs.iter().map(|c| c.0).collect());
-            let wall = median(costs.iter().map(|c| c.1).collect());
-            let report = json(&fs::read_to_string(&report).map_err(|e| format!("{}: {e}", report.display()))?)?;
-            let memory = report["peak_memory_bytes"].as_f64().map_or("-".into(), |b| format!("{:.0} MB", b / 1e6));
-            let measured = reference.error_of(&program, &onl, &folder)?;
-            let verdict = verified(&program, &onl).unwrap_or_else(|| "-".into());
-            println!(
-                "{scene:<10} {error:>6} {cpu:>9.2} {wall:>9.2} {memory:>8} {:>6.2} %   {verdict}",
-                100.0 * measured
-            );
+            bench.line(scene, &file, error, RUNS, Some(&reference))?;
         }
     }
-    Ok(())
+    let mut growth = Vec::new();
+    for (stations, errors) in OFFICES {
+        if extent == Extent::Quick && stations > 36 {
+            continue;
+        }
+        let name = format!("office_{stations}");
+        let file = bench.folder.join(format!("{name}.obj"));
+        let (text, materials, quads) = office(&name, stations);
+        for (path, content) in [(&file, text), (&file.with_extension("mtl"), materials)] {
+            fs::write(path, content).map_err(|e| format!("{}: {e}", path.display()))?;
+        }
+        let errors = if extent == Extent::Quick { &errors[..1] } else { errors };
+        for (k, error) in errors.iter().enumerate() {
+            let cost = bench.line(&name, &file, error, 1, None)?;
+            if k == 0 {
+                growth.push((quads as f64, cost.cpu));
+            }
+        }
+    }
+    println!(
+        "\ngrowth of the offices at {}: CPU s as a power of the number of quads (lamps grow along)",
+        OFFICES[0].1[0]
+    );
+    for pair in growth.windows(2) {
+        let ((n, t), (m, u)) = (pair[0], pair[1]);
+        println!("{n:>6} to {m:>6} quads: {t:>7.2} to {u:>7.2} s, exponent {:.2}", (u / t).ln() / (m / n).ln());
+    }
+    if let Some(exponent) = slope(&growth) {
+        println!("over all: exponent {exponent:.2}");
+    }
+    println!("\nscene       asked   solve: CPU s   wall s   relight: CPU s   wall s   of the solve");
+    bench.relight("cornell", &root.join("bench/scenes/cornell.obj"), "1%", "m1=10,10,10")?;
+    bench.relight("office_36", &bench.folder.join("office_36.obj"), "5%", "lamp=2,3,4")
+}
+
+/// Least squares through logarithms: the power of x that y grows with.
+fn slope(points: &[(f64, f64)]) -> Option<f64> {
+    let n = points.len() as f64;
+    let logs: Vec<(f64, f64)> = points.iter().map(|(x, y)| (x.ln(), y.ln())).collect();
+    let (mx, my) = (logs.iter().map(|l| l.0).sum::<f64>() / n, logs.iter().map(|l| l.1).sum::<f64>() / n);
+    let (mut xy, mut xx) = (0.0, 0.0);
+    for (x, y) in logs {
+        xy += (x - mx) * (y - my);
+        xx += (x - mx) * (x - mx);
+    }
+    (points.len() > 1 && xx > 0.0).then(|| xy / xx)
+}
+
+impl Bench {
+    /// Runs the program and returns what that took.
+    fn timed(&self, arguments: &[&str]) -> Result<Cost, String> {
+        let (start, before) = (Instant::now(), children_seconds());
+        finish(Command::new(&self.program).args(arguments))?;
+        Ok(Cost { cpu: children_seconds() - before, wall: start.elapsed().as_secs_f64() })
+    }
+
+    fn path(&self, name: &str, ending: &str) -> String {
+        self.folder.join(format!("{name}.{ending}")).display().to_string()
+    }
+
+    /// Lights a scene and prints a line of the table.
+    fn line(
+        &self,
+        scene: &str,
+        file: &Path,
+        error: &str,
+        runs: usize,
+        reference: Option<&Reference>,
+    ) -> Result<Cost, String> {
+        let (onl, report) = (self.path(scene, "onl"), self.path(scene, "json"));
+        let file = file.display().to_string();
+        let mut costs = Vec::new();
+        for _ in 0..runs {
+            costs.push(self.timed(&["light", &file, "--error", error, "-o", &onl, "--report", &report])?);
+        }
+        costs.sort_by(|a, b| a.cpu.total_cmp(&b.cpu));
+        let cost = costs[runs / 2];
+        let told = json(&fs::read_to_string(&report).map_err(|e| format!("{report}: {e}"))?)?;
+        let memory = told["peak_memory_bytes"].as_f64().map_or("-".into(), |b| format!("{:.0} MB", b / 1e6));
+        let quads = told["scene"]["sides"].as_u64().map_or("-".into(), |n| n.to_string());
+        let onl = Path::new(&onl);
+        let measured = match reference {
+            Some(reference) => format!("{:.2} %", 100.0 * reference.error_of(&self.program, onl, &self.folder)?),
+            None => "-".into(),
+        };
+        let verdict = verified(&self.program, onl).unwrap_or_else(|| "-".into());
+        let Cost { cpu, wall } = cost;
+        println!("{scene:<12} {quads:>5} {error:>7} {cpu:>9.2} {wall:>9.2} {memory:>8} {measured:>8}   {verdict}");
+        Ok(cost)
+    }
+
+    /// Lights a scene, gives its lamps another colour, and prints what either took.
+    fn relight(&self, scene: &str, file: &Path, error: &str, emission: &str) -> Result<(), String> {
+        let [first, second] = ["kept", "relit"].map(|what| self.path(&format!("{scene}.{what}"), "onl"));
+        let file = file.display().to_string();
+        let solve = self.timed(&["light", &file, "--error", error, "--keep-links", "-o", &first])?;
+        let again = self.timed(&["relight", &first, "--emission", emission, "-o", &second])?;
+        println!(
+            "{scene:<11} {error:>5} {:>14.2} {:>8.2} {:>16.2} {:>8.2} {:>14.3}",
+            solve.cpu,
+            solve.wall,
+            again.cpu,
+            again.wall,
+            again.wall / solve.wall
+        );
+        Ok(())
+    }
 }
 
 /// Runs a command that may end with exit code 0 or 1 (a missed tolerance is a result too).
@@ -165,5 +273,17 @@ impl Reference {
             }
         }
         Ok(off / whole)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_slope_is_the_power() {
+        let points = [1.0, 10.0, 300.0].map(|x: f64| (x, 5.0 * x.powf(1.2)));
+        assert!((slope(&points).unwrap() - 1.2).abs() < 1e-12);
+        assert_eq!(slope(&points[..1]), None);
     }
 }

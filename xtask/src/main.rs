@@ -3,13 +3,14 @@
 //! ```text
 //! cargo xtask ci        everything, as .ci/run does
 //! cargo xtask layers    the architecture alone: who may depend on whom, and the habits a compiler does not check
-//! cargo xtask bench light   what lighting the scenes of bench/scenes costs, and how good the result is
+//! cargo xtask bench light   what lighting costs, how good the result is, how it grows with the scene, and relighting
 //! ```
 
 mod bench;
 mod ci;
 mod layers;
 mod links;
+mod office;
 mod source;
 
 use std::path::{Path, PathBuf};
@@ -21,9 +22,10 @@ fn main() -> ExitCode {
     let result = match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         ["ci"] => ci::run(&root),
         ["layers"] => ci::layers(&root),
-        ["bench", "light"] => bench::light(&root),
+        ["bench", "light"] => bench::light(&root, bench::Extent::Full),
+        ["bench", "light", "--quick"] => bench::light(&root, bench::Extent::Quick),
         _ => {
-            eprintln!("usage: cargo xtask ci | layers | bench light");
+            eprintln!("usage: cargo xtask ci | layers | bench light [--quick]");
             return ExitCode::from(2);
         }
     };
