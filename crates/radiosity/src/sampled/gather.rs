@@ -10,7 +10,8 @@ use super::field::Field;
 use super::lamps::on_cell;
 use crate::kernel::LightKernel;
 use ondelette_compress::{Forest, NodeId};
-use ondelette_numerics::{dense, seed, sobol};
+use ondelette_numerics::sobol::Sobol;
+use ondelette_numerics::{dense, seed};
 use ondelette_wavelet::cell::{CellBasis, CellShape};
 use std::ops::Range;
 
@@ -469,15 +470,14 @@ pub(super) fn cast(kernel: &LightKernel, forest: &Forest, gather: &Gather, draw:
         let covered = covers && kernel.is_covered(side, x);
         let mut only_backs = !covered;
         for (rays, half) in rays.iter_mut().zip([0u64, 1]) {
-            let key = seed::combine(point.key, half);
+            let sequence = Sobol::of(seed::combine(point.key, half));
             for index in draw.directions.clone() {
                 let nowhere = Ray { to: [0.0; 2], leaf: Ray::NOWHERE, point: p };
                 if covered {
                     rays.push(nowhere);
                     continue;
                 }
-                let [u, v, ..] = sobol::point(key, index);
-                let hit = kernel.first_hit_from(side, x, kernel.direction(side, [u, v]));
+                let hit = kernel.first_hit_from(side, x, kernel.direction(side, sequence.point(index)));
                 let met = hit.and_then(|hit| Some((hit, kernel.side_of(hit.patch, !hit.front)?)));
                 only_backs &= hit.is_some() && met.is_none();
                 rays.push(match met {
@@ -501,14 +501,10 @@ fn relocate(forest: &Forest, rays: &mut [Ray]) {
         if ray.leaf == Ray::NOWHERE {
             continue;
         }
-        let mut id = NodeId(ray.leaf);
-        let mut x = ray.to.map(f64::from);
-        while !forest.is_leaf(id) {
-            let (c, local) = forest.node(id).cell.shape.descend(x);
-            (id, x) = (forest.child(id, c), local);
-        }
-        if id.0 != ray.leaf {
-            (ray.leaf, ray.to) = (id.0, x.map(|x| x as f32));
+        let id = NodeId(ray.leaf);
+        if !forest.is_leaf(id) {
+            let (leaf, x) = forest.locate_below(id, ray.to.map(f64::from));
+            (ray.leaf, ray.to) = (leaf.0, x.map(|x| x as f32));
         }
     }
 }
