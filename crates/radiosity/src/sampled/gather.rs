@@ -6,6 +6,7 @@
 //! two independent halves of samples, which say how large their scatter is, and whether what the fit leaves over at the
 //! points is scatter or shape.
 
+use super::direct;
 use super::field::Field;
 use super::lamps::on_cell;
 use crate::kernel::LightKernel;
@@ -108,6 +109,22 @@ impl Gather {
             others: Default::default(),
             order: 1,
             fit: Vec::new(),
+        }
+    }
+
+    /// If it has no point outside of things among the known ones, and the others, which are new, are inside as well,
+    /// moves these to corners that stick out, if any do.
+    pub(super) fn stick_out(&mut self, kernel: &LightKernel, forest: &Forest, known: u32) {
+        let cell = &forest.node(self.node).cell;
+        let element = kernel.element(cell);
+        let is_buried = |point: &Point| kernel.is_buried(cell.root as usize, element.point(point.at));
+        let (known, fresh) = self.points.split_at_mut(known as usize);
+        if self.lit[..known.len()].contains(&true) || !fresh.iter().all(is_buried) {
+            return;
+        }
+        let corners = direct::open_corners(kernel, cell);
+        for (point, corner) in fresh.iter_mut().zip(corners.iter().cycle()) {
+            point.at = *corner;
         }
     }
 
