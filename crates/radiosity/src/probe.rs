@@ -129,7 +129,7 @@ impl<'a> Prober<'a> {
     /// Whether a point of a side, on this leaf, is inside of something.
     fn is_inside(&self, leaf: NodeId, side: usize, at: [f64; 2]) -> bool {
         let lit = self.solution.lit()[leaf.index()];
-        lit < 1.0 && (lit == 0.0 || self.kernel.is_buried(side, self.solution.point(side, at)))
+        lit < 1.0 && self.kernel.is_buried(side, self.solution.point(side, at))
     }
 
     /// Radiosity (exitance plus reflected) at side-local coordinates.

@@ -86,13 +86,15 @@ impl Grid {
         Grid { points, values, matrix }
     }
 
+    /// Coefficients of the constant 1.
+    fn one(&self) -> impl Iterator<Item = f64> {
+        self.matrix.chunks(self.points.len()).map(|row| row.iter().sum())
+    }
+
     /// Samples to coefficients by the `lit` points alone; what they leave open is pulled to their mean.
     fn part(&self, lit: &[bool], n: usize) -> Vec<f64> {
         let count = self.points.len();
         let alive = lit.iter().filter(|l| **l).count();
-        if alive == 0 {
-            return vec![0.0; n * count];
-        }
         let share = 1.0 / alive as f64;
         let mut gram = vec![0.0; n * n];
         for (row, _) in self.values.chunks(n).zip(lit).filter(|(_, lit)| **lit) {
@@ -103,7 +105,7 @@ impl Grid {
             }
         }
         // coefficients of the constant 1, and what it leaves
-        let one: Vec<f64> = self.matrix.chunks(count).map(|row| row.iter().sum()).collect();
+        let one: Vec<f64> = self.one().collect();
         let constant: Vec<f64> = (0..n).map(|i| (0..n).map(|j| gram[i * n + j] * one[j]).sum()).collect();
         (0..n).for_each(|i| gram[i * n + i] += 1e-4);
         let inverse = dense::inverse(&gram, n);
@@ -117,6 +119,34 @@ impl Grid {
             }
         }
         matrix
+    }
+}
+
+/// The corners of a cell, a little way in.
+fn corners(shape: CellShape) -> &'static [[f64; 2]] {
+    match shape {
+        CellShape::Triangle => &[[0.01, 0.01], [0.98, 0.01], [0.01, 0.98]],
+        _ => &[[0.01, 0.01], [0.99, 0.01], [0.01, 0.99], [0.99, 0.99]],
+    }
+}
+
+/// The corners of a cell that are not inside of something.
+pub(super) fn open_corners(kernel: &LightKernel, cell: &Cell) -> Vec<[f64; 2]> {
+    let element = kernel.element(cell);
+    let open = |x: &&[f64; 2]| !kernel.is_buried(cell.root as usize, element.point(**x));
+    corners(cell.shape).iter().filter(open).copied().collect()
+}
+
+/// Share of an element that is not inside of something, from how many of its points and corners are not: where all
+/// points are alike, a corner that is not is worth a part of a point.
+fn share_of(open: usize, points: usize, open_corners: usize, corners: usize) -> f64 {
+    let corner = 0.25 / points as f64;
+    if open == points {
+        1.0 - corner * (corners - open_corners) as f64
+    } else if open == 0 {
+        corner * open_corners as f64
+    } else {
+        open as f64 / points as f64
     }
 }
 
@@ -135,7 +165,7 @@ pub(super) fn fit(kernel: &LightKernel, lamps: &Lamps, forest: &Forest, cell: &C
     if seen.is_empty() {
         let grid = Grid::of(basis, cell.key);
         let open = grid.points.iter().filter(|x| !is_buried(**x)).count();
-        let lit = open as f64 / grid.points.len() as f64;
+        let lit = share_of(open, grid.points.len(), open_corners(kernel, cell).len(), corners(cell.shape).len());
         let zero = vec![0.0; groups];
         return Fit { coefficients: vec![0.0; groups * n], misfit: zero.clone(), scatter: zero, lit };
     }
@@ -188,11 +218,23 @@ pub(super) fn fit(kernel: &LightKernel, lamps: &Lamps, forest: &Forest, cell: &C
     let dark = |q: usize| (0..groups).all(|g| values[g * count + q] == [0.0; 2]) && is_buried(grid.points[q]);
     let lit: Vec<bool> = (0..count).map(|q| !dark(q)).collect();
     let alive = lit.iter().filter(|l| **l).count();
+    let tips = open_corners(kernel, cell);
+    let share = share_of(alive, count, tips.len(), corners(cell.shape).len());
+    if alive == 0 {
+        // all that sticks out is a corner or two
+        let values = sample(&mut view, &mut tips.iter().copied(), tips.len());
+        for values in values.chunks(tips.len().max(1)).take(groups) {
+            let mean = values.iter().map(|v| 0.5 * (v[0] + v[1])).sum::<f64>() / tips.len() as f64;
+            coefficients.extend(grid.one().map(|one| one * mean));
+        }
+        coefficients.resize(groups * n, 0.0);
+        let zero = vec![0.0; groups];
+        return Fit { coefficients, misfit: zero.clone(), scatter: zero, lit: share };
+    }
     let part = if alive == count { None } else { Some(grid.part(&lit, n)) };
     let matrix = part.as_ref().unwrap_or(&grid.matrix);
-    let share = alive as f64 / count as f64;
     let freedom = alive.saturating_sub(n).max(1) as f64;
-    let alive = alive.max(1) as f64;
+    let alive = alive as f64;
     for values in values.chunks(count) {
         let own: Vec<[f64; 2]> = matrix
             .chunks(count)

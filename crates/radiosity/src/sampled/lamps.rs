@@ -11,7 +11,8 @@ use crate::scene::Scene;
 use crate::visible::View;
 use glam::DVec3;
 use ondelette_compress::Cell;
-use ondelette_numerics::{seed, sobol};
+use ondelette_numerics::seed;
+use ondelette_numerics::sobol::Sobol;
 use ondelette_wavelet::cell::CellShape;
 
 /// Emitters up to which each is a lamp of its own; fainter ones are met by rays.
@@ -293,9 +294,10 @@ impl Lamps {
         let Some((last, _)) = cones.iter().flatten().last().copied().filter(|_| whole > 0.0) else { return 0.0 };
         let patches = [kernel.sides()[side].patch, lamp.patch];
         let m = lamp.element.normal();
+        let sequence = Sobol::of(key);
         let mut sum = 0.0;
         for i in 0..rays {
-            let [s, t, ..] = sobol::point(key, i);
+            let [s, t] = sequence.point(i);
             let at = s * whole;
             let chosen = cones.iter().flatten().find(|c| at < c.1);
             let (cone, end) = chosen.copied().unwrap_or((last, whole));

@@ -144,7 +144,11 @@ impl Sampled {
         }
         let leaves: Vec<NodeId> = (0..forest.len() as u32).map(NodeId).filter(|&id| forest.is_leaf(id)).collect();
         let fine = |id: NodeId| forest.node(id).measure > SMALL_SHARE * area;
-        let gathers: Vec<Gather> = leaves.iter().map(|&id| Gather::new(&forest, id, fine(id))).collect();
+        let gathers = par::map(leaves.len(), |k| {
+            let mut gather = Gather::new(&forest, leaves[k], fine(leaves[k]));
+            gather.stick_out(&kernel, &forest, 0);
+            gather
+        });
         let draw = |(k, gather): (usize, &Gather)| Gather::all(k, gather.points(), 0..FIRST_DIRECTIONS);
         let draws = gathers.iter().enumerate().map(draw).collect();
         let phase = Phase::Fitting { nodes: leaves, done: 0, draws };

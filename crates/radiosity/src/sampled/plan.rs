@@ -292,7 +292,8 @@ impl Sampled {
                 verdicts.push(self.verdicts[k]);
                 continue;
             }
-            for (c, (child, known)) in gather.split(&self.forest).into_iter().enumerate() {
+            for (c, (mut child, known)) in gather.split(&self.forest).into_iter().enumerate() {
+                child.stick_out(&self.kernel, &self.forest, known);
                 let mut values = vec![[0.0; 3]; stride];
                 let n = basis.len();
                 basis.push(c, &own[..n], &mut values[..n], |to: &mut [f64; 3], k, from: [f64; 3]| {
