@@ -189,6 +189,10 @@ impl Gather {
         let early = (Self::FIRST.saturating_sub(draw.directions.start) as usize).min(draw.directions.len());
         for (h, rays) in cast.rays.into_iter().enumerate() {
             let directions = rays.len() / draw.points.len().max(1);
+            // not a byte more than is counted
+            let first = early * (rays.len() / directions.max(1));
+            self.first[h].reserve_exact(first);
+            self.others[h].reserve_exact(rays.len() - first);
             for ray in rays.chunks(directions.max(1)) {
                 self.first[h].extend_from_slice(&ray[..early]);
                 self.others[h].extend_from_slice(&ray[early..]);
@@ -290,6 +294,7 @@ impl Gather {
         children
             .into_iter()
             .map(|mut child| {
+                child.first.iter_mut().chain(&mut child.others).for_each(Vec::shrink_to_fit);
                 let known = child.points();
                 child.add_points(forest, 1);
                 (child, known)
