@@ -78,8 +78,9 @@ mod tests {
         let f = |p: [f64; 2]| p.iter().map(|x| (std::f64::consts::PI * x).sin()).product::<f64>();
         let exact = (2.0 / std::f64::consts::PI).powi(2);
         let error = |n: u32| {
-            let square: f64 =
-                (0..32).map(|key| ((0..n).map(|i| f(Sobol::of(key).point(i))).sum::<f64>() / f64::from(n) - exact).powi(2)).sum();
+            let square: f64 = (0..32)
+                .map(|key| ((0..n).map(|i| f(Sobol::of(key).point(i))).sum::<f64>() / f64::from(n) - exact).powi(2))
+                .sum();
             (square / 32.0).sqrt()
         };
         // chance: 0.2 / sqrt(1024) = 0.006

@@ -51,7 +51,6 @@ fn disc(p: [f64; 2]) -> [f64; 2] {
     // Taylor's series: up to pi / 4 they are good to 1e-9 and 1e-10, and the same on every machine
     let q = angle * angle;
     let sine = angle * (1.0 + q * (-1.0 / 6.0 + q * (1.0 / 120.0 + q * (-1.0 / 5040.0 + q / 362_880.0))));
-    let cosine = 1.0
-        + q * (-0.5 + q * (1.0 / 24.0 + q * (-1.0 / 720.0 + q * (1.0 / 40_320.0 - q / 3_628_800.0))));
+    let cosine = 1.0 + q * (-0.5 + q * (1.0 / 24.0 + q * (-1.0 / 720.0 + q * (1.0 / 40_320.0 - q / 3_628_800.0))));
     if turned { [r * sine, r * cosine] } else { [r * cosine, r * sine] }
 }
