@@ -11,7 +11,7 @@ use crate::solver::Event;
 use ondelette_compress::NodeId;
 
 /// The estimate of the mean absolute error times this is above the root mean square of most surfaces, too.
-const SAFETY: f64 = 1.55;
+const SAFETY: f64 = 1.3;
 /// Share of the promise that is aimed at.
 pub(super) const AIM: f64 = 0.95;
 /// Mean absolute value of a scattered number, over its standard deviation.
