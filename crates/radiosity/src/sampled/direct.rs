@@ -3,7 +3,7 @@
 //! Where nothing stands between, the light is smooth: interpolation at Gauss points, judged at test points. Where
 //! something may, it has edges: least squares over a fine grid, judged by its own residuals.
 
-use super::lamps::{Lamps, on_cell};
+use super::lamps::{self, Lamps, on_cell};
 use crate::kernel::LightKernel;
 use crate::visible::View;
 use ondelette_compress::{Cell, Forest};
@@ -21,6 +21,8 @@ pub(super) struct Fit {
     pub(super) scatter: Vec<f32>,
     /// Share of the element that is not inside of something.
     pub(super) lit: f64,
+    /// Work that it took, in rays about: what was cut out exactly, and rays.
+    pub(super) work: [f64; 2],
 }
 
 /// A fit to samples on a grid, by least squares.
@@ -164,11 +166,19 @@ pub(super) fn fit(kernel: &LightKernel, lamps: &Lamps, forest: &Forest, cell: &C
     let is_buried = |x: [f64; 2]| kernel.is_buried(cell.root as usize, element.point(x));
     if seen.is_empty() {
         let grid = Grid::of(basis, cell.key);
+        let points = grid.points.len() as f64;
         let open = grid.points.iter().filter(|x| !is_buried(**x)).count();
         let lit = share_of(open, grid.points.len(), open_corners(kernel, cell).len(), corners(cell.shape).len());
         let zero = vec![0.0; groups];
-        return Fit { coefficients: vec![0.0; groups * n], misfit: zero.clone(), scatter: zero, lit };
+        return Fit {
+            coefficients: vec![0.0; groups * n],
+            misfit: zero.clone(),
+            scatter: zero,
+            lit,
+            work: [points, 0.0],
+        };
     }
+    let work = lamps::work(&seen).map(|w| w * (4 * n.max(4)) as f64);
     let masked = seen.iter().any(|s| s.is_masked()) || kernel.has_covers(cell.root as usize);
     let mut view = View::new(kernel.occluders().tolerance());
     // values of both halves at the points, `[group][point]`
@@ -209,7 +219,7 @@ pub(super) fn fit(kernel: &LightKernel, lamps: &Lamps, forest: &Forest, cell: &C
             misfit.push((missed / tests.len() as f64) as f32);
             coefficients.extend(own);
         }
-        return Fit { coefficients, misfit, scatter: vec![0.0; groups], lit: 1.0 };
+        return Fit { coefficients, misfit, scatter: vec![0.0; groups], lit: 1.0, work };
     }
     let grid = Grid::of(basis, cell.key);
     let count = grid.points.len();
@@ -229,7 +239,7 @@ pub(super) fn fit(kernel: &LightKernel, lamps: &Lamps, forest: &Forest, cell: &C
         }
         coefficients.resize(groups * n, 0.0);
         let zero = vec![0.0; groups];
-        return Fit { coefficients, misfit: zero.clone(), scatter: zero, lit: share };
+        return Fit { coefficients, misfit: zero.clone(), scatter: zero, lit: share, work };
     }
     let part = if alive == count { None } else { Some(grid.part(&lit, n)) };
     let matrix = part.as_ref().unwrap_or(&grid.matrix);
@@ -259,7 +269,7 @@ pub(super) fn fit(kernel: &LightKernel, lamps: &Lamps, forest: &Forest, cell: &C
         } as f32);
         scatter.push((square * n as f64 / alive).sqrt() as f32);
     }
-    Fit { coefficients, misfit, scatter, lit: share }
+    Fit { coefficients, misfit, scatter, lit: share, work }
 }
 
 /// Mean absolute value of a misfit, over its root mean square, about.

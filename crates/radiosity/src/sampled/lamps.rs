@@ -90,6 +90,19 @@ impl Sight {
     }
 }
 
+/// Work at a point for the lamps seen, in rays about: what is cut out exactly, and rays.
+pub(super) fn work(seen: &[Sight]) -> [f64; 2] {
+    let mut work = [0.0; 2];
+    for sight in seen {
+        match &sight.between {
+            Between::Nothing => work[0] += 0.5,
+            Between::Patches(patches) => work[0] += 2.0 + 0.5 * patches.len() as f64,
+            Between::Many(rays) => work[1] += rays,
+        }
+    }
+    work
+}
+
 impl Lamps {
     /// The emitters of a scene; `error` is promised.
     pub(super) fn of(scene: &Scene, kernel: &LightKernel, error: f64) -> Self {

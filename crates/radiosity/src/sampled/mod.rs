@@ -19,6 +19,7 @@ mod lamps;
 mod memory;
 mod plan;
 mod positive;
+mod shares;
 mod sphere;
 mod stitch;
 
@@ -107,6 +108,10 @@ pub(crate) struct Sampled {
     corrections: u32,
     /// What share of the promise batches aim at.
     aim: f64,
+    /// How much more all errors together are than the root of the sum of their squares.
+    overlap: f64,
+    /// Work so far for direct light, in rays: what is cut out exactly, and what rays decide.
+    work: [f64; 2],
     rounds: u32,
     /// Whether direct light changed since the last balance.
     refitted: bool,
@@ -188,6 +193,8 @@ impl Sampled {
             amplification: 1.0,
             corrections: 0,
             aim: plan::AIM,
+            overlap: 1.0,
+            work: [0.0; 2],
             rounds: 0,
             refitted: false,
             stalled: false,
@@ -263,6 +270,7 @@ impl Sampled {
             self.misfit[own.clone()].copy_from_slice(&fit.misfit);
             self.scatter[own].copy_from_slice(&fit.scatter);
             self.lit[id.index()] = fit.lit as f32;
+            (0..2).for_each(|k| self.work[k] += fit.work[k]);
         }
         self.statistics.kernel_samples += count as u64;
         self.refitted = true;
