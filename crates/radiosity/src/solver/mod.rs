@@ -179,8 +179,8 @@ impl Solver {
         engine.map(Solver).ok_or_else(|| SolveError::NothingKept(solution.scene().name.clone()))
     }
 
-    /// Lights the scene anew: materials emit or reflect something else, the samples or links stay. The next [`Event::Solved`]
-    /// states the new error; steps after that spend the rays that are missing to the promise.
+    /// Lights the scene anew: materials emit or reflect something else, the samples or links stay. The next
+    /// [`Event::Solved`] states the new error; steps after that spend the rays that are missing to the promise.
     ///
     /// **Cost** to that event some sweeps over the samples or links; no ray.
     ///

@@ -1,6 +1,6 @@
 //! Triangles for a leaf in a penumbra: cells halved where colours between their corners would be seen to be wrong, with
-//! direct light gathered anew at every corner. Where cells of different sizes meet, the larger takes over the corners of
-//! the smaller, so that no seam opens.
+//! direct light gathered anew at every corner. Where cells of different sizes meet, the larger takes over the corners
+//! of the smaller, so that no seam opens.
 
 use super::{Leaf, Painted};
 use ondelette_compress::Cell;

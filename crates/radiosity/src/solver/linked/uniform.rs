@@ -16,8 +16,8 @@ pub(super) const MOST_BYTES: u64 = 2_000_000_000;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 #[error(
     "the full matrix of {elements} elements takes {}, and {} are allowed: with a cap of memory (--memory) and the \
-     solvers gmres or jacobi, rows that do not fit are coupled anew in every sweep; the methods hierarchical, wavelet and \
-     sampled store no full matrix",
+     solvers gmres or jacobi, rows that do not fit are coupled anew in every sweep; the methods hierarchical, wavelet \
+     and sampled store no full matrix",
     size(*.bytes),
     size(*.most)
 )]
