@@ -110,9 +110,9 @@ impl<'a> Prober<'a> {
         self.exact.as_ref().is_some_and(|exact| exact.is_marked(leaf))
     }
 
-    /// Irradiance on one leaf at a local point of its cell, also on its edges, where [`Prober::irradiance`] looks at
-    /// the neighbours too. Inside of things it is the leaf's function, not 0: what is interpolated between points on either
-    /// side of their foot would be dark in front of it.
+    /// Irradiance on one leaf at a local point of its cell, also on its edges, where [`Prober::irradiance`] looks
+    /// at the neighbours too. Inside of things it is the leaf's function, not 0: what is interpolated between
+    /// points on either side of their foot would be dark in front of it.
     ///
     /// # Panics
     /// If there is no such node.
