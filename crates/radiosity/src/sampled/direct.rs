@@ -3,7 +3,7 @@
 //! Where nothing stands between, the light is smooth: interpolation at Gauss points, judged at test points. Where
 //! something may, it has edges: least squares over a fine grid, judged by its own residuals.
 
-use super::lamps::{self, Lamps, on_cell};
+use super::lamps::{Crowded, Lamps, Seen, on_cell};
 use crate::kernel::LightKernel;
 use crate::visible::View;
 use ondelette_compress::{Cell, Forest};
@@ -23,6 +23,8 @@ pub(super) struct Fit {
     pub(super) lit: f64,
     /// Work that it took, in rays about: what was cut out exactly, and rays.
     pub(super) work: [f64; 2],
+    /// What a fit with more rays need not find out again, if there is anything for rays to find.
+    pub(super) known: Option<Known>,
 }
 
 /// A fit to samples on a grid, by least squares.
@@ -155,60 +157,98 @@ fn share_of(open: usize, points: usize, open_corners: usize, corners: usize) -> 
 /// A misfit below this many of its standard deviations is taken for scatter.
 const SIGNIFICANT: f64 = 1.0;
 
+/// What a fit found out on an element, for fits with more rays to go on from.
+#[derive(Clone, Debug)]
+pub(super) struct Known {
+    /// What is cut out exactly, at the points of the grid, `[group][point]`.
+    exact: Box<[f64]>,
+    /// What is left to rays, how many of a point there were, and what they found: of both halves, likewise.
+    crowded: Box<[Crowded]>,
+    rays: f64,
+    found: Box<[[f64; 2]]>,
+}
+
+impl Known {
+    /// Counted bytes.
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(&*self.exact) + size_of_val(&*self.crowded) + size_of_val(&*self.found)
+    }
+}
+
 /// Fits the light of the lamps on a cell; a point sends about `rays` to all lamps together that it may see past many
-/// things.
-pub(super) fn fit(kernel: &LightKernel, lamps: &Lamps, forest: &Forest, cell: &Cell, rays: f64) -> Fit {
+/// things. `known` is what an earlier fit of the same cell found.
+pub(super) fn fit(
+    kernel: &LightKernel,
+    lamps: &Lamps,
+    forest: &Forest,
+    cell: &Cell,
+    (rays, known): (f64, Option<&Known>),
+) -> Fit {
     let groups = lamps.groups.len();
     let basis = forest.basis(cell.shape);
     let n = basis.len();
-    let seen = lamps.seen_by(kernel, cell, rays);
+    let seen = if known.is_some() { Seen::default() } else { lamps.seen_by(kernel, cell) };
+    let crowded = known.map_or(&seen.crowded[..], |k| &k.crowded);
     let element = kernel.element(cell);
     let is_buried = |x: [f64; 2]| kernel.is_buried(cell.root as usize, element.point(x));
-    if seen.is_empty() {
+    let zero = vec![0.0; groups];
+    if known.is_none() && seen.is_empty() {
         let grid = Grid::of(basis, cell.key);
         let points = grid.points.len() as f64;
         let open = grid.points.iter().filter(|x| !is_buried(**x)).count();
         let lit = share_of(open, grid.points.len(), open_corners(kernel, cell).len(), corners(cell.shape).len());
-        let zero = vec![0.0; groups];
-        return Fit {
-            coefficients: vec![0.0; groups * n],
-            misfit: zero.clone(),
-            scatter: zero,
-            lit,
-            work: [points, 0.0],
-        };
+        let coefficients = vec![0.0; groups * n];
+        return Fit { coefficients, misfit: zero.clone(), scatter: zero, lit, work: [points, 0.0], known: None };
     }
-    let work = lamps::work(&seen).map(|w| w * (4 * n.max(4)) as f64);
-    let masked = seen.iter().any(|s| s.is_masked()) || kernel.has_covers(cell.root as usize);
     let mut view = View::new(kernel.occluders().tolerance());
-    // values of both halves at the points, `[group][point]`
-    let sample = |view: &mut View, points: &mut dyn Iterator<Item = [f64; 2]>, count: usize| {
-        let mut values = vec![[0.0; 2]; groups * count];
-        let mut out = vec![[0.0; 2]; groups];
+    // at points, `[group][point]`
+    let exact = |view: &mut View, points: &mut dyn Iterator<Item = [f64; 2]>, count: usize| {
+        let mut values = vec![0.0; groups * count];
+        let mut out = vec![0.0; groups];
         for (q, local) in points.enumerate() {
             let x = element.point(local);
-            out.fill([0.0; 2]);
+            out.fill(0.0);
             if !kernel.is_covered(cell.root as usize, x) {
-                let at = (cell.root as usize, x, element.normal());
-                lamps.irradiance(kernel, view, &seen, at, seed::combine(cell.key, q as u64), &mut out);
+                lamps.exact(kernel, view, &seen, (x, element.normal()), &mut out);
             }
-            for (g, o) in out.iter().enumerate() {
-                values[g * count + q] = *o;
+            (0..groups).for_each(|g| values[g * count + q] = out[g]);
+        }
+        values
+    };
+    // what rays find there, of both halves; those that were drawn count, too
+    let by_rays = |points: &[[f64; 2]], before: Option<&Known>| {
+        let mut values = before.map_or_else(|| vec![[0.0; 2]; groups * points.len()], |k| k.found.to_vec());
+        let drawn = before.map_or(0.0, |k| k.rays);
+        let fresh = (rays - drawn).max(0.0);
+        if fresh == 0.0 {
+            return values;
+        }
+        values.iter_mut().flatten().for_each(|v| *v *= drawn / rays);
+        let mut out = vec![[0.0; 2]; groups];
+        for (q, local) in points.iter().enumerate().filter(|_| !crowded.is_empty()) {
+            let x = element.point(*local);
+            if kernel.is_covered(cell.root as usize, x) {
+                continue;
+            }
+            out.fill([0.0; 2]);
+            let key = seed::combine(seed::combine(cell.key, q as u64), drawn.to_bits());
+            lamps.by_rays(kernel, (crowded, fresh), (cell.root as usize, x, element.normal()), key, &mut out);
+            for (g, out) in out.iter().enumerate() {
+                (0..2).for_each(|h| values[g * points.len() + q][h] += out[h] * (fresh / rays));
             }
         }
         values
     };
     let (mut misfit, mut scatter) = (Vec::with_capacity(groups), Vec::with_capacity(groups));
     let mut coefficients = Vec::with_capacity(groups * n);
-    if !masked {
+    if known.is_none() && !seen.is_masked() && !kernel.has_covers(cell.root as usize) {
         let analysis = basis.analysis(basis.order());
         let tests = cell.shape.test_points();
         let fitted = analysis.points.len();
         let count = fitted + tests.len();
-        let values = sample(&mut view, &mut analysis.points.iter().chain(&tests).copied(), count);
+        let values = exact(&mut view, &mut analysis.points.iter().chain(&tests).copied(), count);
         let mut functions = [0.0; 36];
         for values in values.chunks(count) {
-            let values: Vec<f64> = values.iter().map(|v| v[0]).collect();
             let own = analysis.coefficients(&values[..fitted]);
             let mut missed = 0.0;
             for (x, value) in tests.iter().zip(&values[fitted..]) {
@@ -219,11 +259,18 @@ pub(super) fn fit(kernel: &LightKernel, lamps: &Lamps, forest: &Forest, cell: &C
             misfit.push((missed / tests.len() as f64) as f32);
             coefficients.extend(own);
         }
-        return Fit { coefficients, misfit, scatter: vec![0.0; groups], lit: 1.0, work };
+        let work = [seen.work() * count as f64, 0.0];
+        return Fit { coefficients, misfit, scatter: zero, lit: 1.0, work, known: None };
     }
     let grid = Grid::of(basis, cell.key);
     let count = grid.points.len();
-    let values = sample(&mut view, &mut grid.points.iter().copied(), count);
+    let cut = known.map_or_else(|| exact(&mut view, &mut grid.points.iter().copied(), count), |k| k.exact.to_vec());
+    let found = by_rays(&grid.points, known);
+    let values: Vec<[f64; 2]> = found.iter().zip(&cut).map(|(found, cut)| found.map(|f| f + cut)).collect();
+    let fresh = rays - known.map_or(0.0, |k| k.rays);
+    let work = [seen.work(), crowded.iter().map(|c| fresh * f64::from(c.1)).sum()].map(|w: f64| w * count as f64);
+    let known =
+        (!crowded.is_empty()).then(|| Known { exact: cut.into(), crowded: crowded.into(), rays, found: found.into() });
     // where no lamp shines it may be dark inside of something
     let dark = |q: usize| (0..groups).all(|g| values[g * count + q] == [0.0; 2]) && is_buried(grid.points[q]);
     let lit: Vec<bool> = (0..count).map(|q| !dark(q)).collect();
@@ -232,14 +279,14 @@ pub(super) fn fit(kernel: &LightKernel, lamps: &Lamps, forest: &Forest, cell: &C
     let share = share_of(alive, count, tips.len(), corners(cell.shape).len());
     if alive == 0 {
         // all that sticks out is a corner or two
-        let values = sample(&mut view, &mut tips.iter().copied(), tips.len());
+        let (cut, found) = (exact(&mut view, &mut tips.iter().copied(), tips.len()), by_rays(&tips, None));
+        let values: Vec<f64> = found.iter().zip(&cut).map(|(f, cut)| 0.5 * (f[0] + f[1]) + cut).collect();
         for values in values.chunks(tips.len().max(1)).take(groups) {
-            let mean = values.iter().map(|v| 0.5 * (v[0] + v[1])).sum::<f64>() / tips.len() as f64;
+            let mean = values.iter().sum::<f64>() / tips.len() as f64;
             coefficients.extend(grid.one().map(|one| one * mean));
         }
         coefficients.resize(groups * n, 0.0);
-        let zero = vec![0.0; groups];
-        return Fit { coefficients, misfit: zero.clone(), scatter: zero, lit: share, work };
+        return Fit { coefficients, misfit: zero.clone(), scatter: zero, lit: share, work, known: None };
     }
     let part = if alive == count { None } else { Some(grid.part(&lit, n)) };
     let matrix = part.as_ref().unwrap_or(&grid.matrix);
@@ -269,7 +316,7 @@ pub(super) fn fit(kernel: &LightKernel, lamps: &Lamps, forest: &Forest, cell: &C
         } as f32);
         scatter.push((square * n as f64 / alive).sqrt() as f32);
     }
-    Fit { coefficients, misfit, scatter, lit: share, work }
+    Fit { coefficients, misfit, scatter, lit: share, work, known }
 }
 
 /// Mean absolute value of a misfit, over its root mean square, about.

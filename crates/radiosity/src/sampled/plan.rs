@@ -10,7 +10,8 @@ use super::{Phase, Sampled};
 use crate::solver::Event;
 use ondelette_compress::NodeId;
 
-/// The estimate of the mean absolute error times this is above the root mean square of most surfaces, too.
+/// The estimate of the mean absolute error times this is above it also where estimates are low: among furniture, and
+/// at the sharpest edges.
 const SAFETY: f64 = 1.3;
 /// Share of the promise that is aimed at.
 pub(super) const AIM: f64 = 0.95;
@@ -23,7 +24,7 @@ const LAMP_POWER: f64 = 2.0;
 /// Work that smaller gathering elements take, as a share of what rays take: their rays count as rays.
 const SPLITTING: f64 = 0.4;
 /// Limits of how much more all errors together are than the root of the sum of their squares.
-const OVERLAP: [f64; 2] = [1.0, 1.4];
+const OVERLAP: [f64; 2] = [1.0, 2.2];
 /// Scatter falls with this power of the samples.
 const POWER: f64 = 0.7;
 /// Most directions of a point and half.
@@ -41,14 +42,14 @@ const WORTHY: f64 = 1.0 / 400.0;
 const FLOOR: f64 = 0.4;
 /// A misfit larger than this many of its standard deviations is one.
 const SIGNIFICANT: f64 = 1.5;
-/// Factor of the rays of a point to the lamps where they scatter too much, and most of them.
-const MORE_LAMP_RAYS: f32 = 4.0;
-const MOST_LAMP_RAYS: f32 = 16_384.0;
+/// Most rays of a point to the lamps where they scatter, and the factor of them below which more are not worth it.
+const MOST_LAMP_RAYS: f64 = 16_384.0;
+const ENOUGH_LAMP_RAYS: f64 = 1.2;
 /// Deepest split.
 const DEEPEST: u32 = 16;
-/// Rounds after which every round aims lower by as much as is missing; earlier, if no more than this factor is.
+/// Rounds after which every round aims lower by as much as is missing, within these limits.
 const PATIENT_ROUNDS: u32 = 3;
-const NEARLY: f64 = 0.65;
+const LOWER: [f64; 2] = [0.65, 0.95];
 /// Rounds after which nothing more is hoped for.
 const MOST_ROUNDS: u32 = 40;
 
@@ -74,8 +75,8 @@ impl Sampled {
             self.phase = Phase::Finished;
         } else {
             let missing = self.settings.error / self.error;
-            if self.rounds > PATIENT_ROUNDS || self.rounds > 1 && missing > NEARLY {
-                self.aim *= missing.clamp(NEARLY, 0.95);
+            if self.rounds > PATIENT_ROUNDS {
+                self.aim *= missing.clamp(LOWER[0], LOWER[1]);
             }
             self.spend();
         }
@@ -172,13 +173,16 @@ impl Sampled {
             let aim = self.aim * self.settings.error * self.whole / (SAFETY * self.overlap);
             let [direct, lamps, scatter, misfit] = shares(self.kinds(), aim);
             let leaves = self.worst_leaves(direct);
-            let unclear = self.unclear_leaves(lamps, &leaves);
-            if !leaves.is_empty() && self.make_room(&[]) {
-                return self.stop_for_memory();
+            if !leaves.is_empty() {
+                if self.make_room(&[]) {
+                    return self.stop_for_memory();
+                }
+                let nodes = self.split(&leaves);
+                self.phase = Phase::Fitting { nodes, done: 0, draws: Vec::new() };
+                return;
             }
-            if !leaves.is_empty() || !unclear.is_empty() {
-                let mut nodes = self.split(&leaves);
-                nodes.extend(unclear);
+            let nodes = self.unclear_leaves(lamps);
+            if !nodes.is_empty() {
                 self.phase = Phase::Fitting { nodes, done: 0, draws: Vec::new() };
                 return;
             }
@@ -198,7 +202,7 @@ impl Sampled {
                 return;
             }
             // every part is within its share, and yet the sum is not
-            self.aim *= 0.8;
+            self.aim *= 0.93;
             if self.aim < 0.05 {
                 self.stalled = true;
                 self.phase = Phase::Finished;
@@ -235,36 +239,43 @@ impl Sampled {
         leaves
     }
 
-    /// The leaves whose view of the lamps scatters most, as many as bring the sum down to `target` with more rays,
-    /// which they are given; not those that are split anyway.
-    fn unclear_leaves(&mut self, target: f64, split: &[NodeId]) -> Vec<NodeId> {
-        let mut worst: Vec<(f64, u32)> = Vec::new();
+    /// The leaves whose view of the lamps scatters too much for the sum to be `target`: they are given the rays that
+    /// bring it there, where they do most.
+    fn unclear_leaves(&mut self, target: f64) -> Vec<NodeId> {
+        // the scatter of one ray, as an integral over the leaf: n rays of a point leave its part 1 / sqrt(n)
+        let mut leaves: Vec<(usize, f64)> = Vec::new();
         let mut total = 0.0;
         for (n, node) in self.forest.nodes().iter().enumerate() {
             if node.first_child == 0 && self.counts(node.cell.root) {
                 let scatter = node.measure * f64::from(self.lit[n]) * self.direct_error(n).1;
-                total += scatter;
-                if scatter > 0.0 && self.rays[n] < MOST_LAMP_RAYS && split.binary_search(&NodeId(n as u32)).is_err() {
-                    worst.push((scatter / f64::from(self.rays[n]), n as u32));
+                if scatter > 0.0 {
+                    total += scatter;
+                    leaves.push((n, scatter * f64::from(self.rays[n]).sqrt()));
                 }
             }
         }
-        if total <= target {
+        if total <= target * (1.0 + 1e-3) {
             return Vec::new();
         }
-        worst.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        let mut rest = 1.5 * (total - target);
-        let mut leaves = Vec::new();
-        for (scatter, n) in worst {
-            if rest <= 0.0 {
-                break;
-            }
-            rest -= scatter * f64::from(self.rays[n as usize]);
-            self.rays[n as usize] *= MORE_LAMP_RAYS;
-            leaves.push(NodeId(n));
+        // least rays for a sum of scatter / sqrt(n): n in proportion to scatter^(2/3)
+        let wanted = |factor: f64, n: usize, one: f64| {
+            let now = f64::from(self.rays[n]);
+            (factor * one.powf(2.0 / 3.0)).clamp(now, MOST_LAMP_RAYS.max(now))
+        };
+        let sum = |factor: f64| leaves.iter().map(|&(n, one)| one / wanted(factor, n, one).sqrt()).sum::<f64>();
+        let (mut low, mut high) = (-700.0, 700.0);
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if sum(f64::exp(middle)) > target { low = middle } else { high = middle }
         }
-        leaves.sort_unstable();
-        leaves
+        let factor = f64::exp(high);
+        let given: Vec<(usize, f64)> = leaves.iter().map(|&(n, one)| (n, wanted(factor, n, one))).collect();
+        let more: Vec<(usize, f64)> =
+            given.into_iter().filter(|&(n, rays)| rays > ENOUGH_LAMP_RAYS * f64::from(self.rays[n])).collect();
+        for &(n, rays) in &more {
+            self.rays[n] = rays as f32;
+        }
+        more.into_iter().map(|(n, _)| NodeId(n as u32)).collect()
     }
 
     /// Splits the gathering elements that their functions do not fit; returns new leaves to be fitted, and what is to
