@@ -4,6 +4,7 @@
 //! something may, it has edges: least squares over a fine grid, judged by its own residuals.
 
 use super::lamps::{Crowded, Lamps, Seen, on_cell};
+use super::plan::{FLOOR, MEAN_OF_SCATTER};
 use crate::kernel::LightKernel;
 use crate::visible::View;
 use ondelette_compress::{Cell, Forest};
@@ -157,6 +158,10 @@ fn share_of(open: usize, points: usize, open_corners: usize, corners: usize) -> 
 /// A misfit below this many of its standard deviations is taken for scatter.
 const SIGNIFICANT: f64 = 1.0;
 
+/// Among many things light has features finer than the points of an element can tell: what they say of its error is low
+/// by about this factor (against independent paths in furnished rooms).
+const DOUBT: f64 = 1.3;
+
 /// What a fit found out on an element, for fits with more rays to go on from.
 #[derive(Clone, Debug)]
 pub(super) struct Known {
@@ -269,6 +274,7 @@ pub(super) fn fit(
     let values: Vec<[f64; 2]> = found.iter().zip(&cut).map(|(found, cut)| found.map(|f| f + cut)).collect();
     let fresh = rays - known.map_or(0.0, |k| k.rays);
     let work = [seen.work(), crowded.iter().map(|c| fresh * f64::from(c.1)).sum()].map(|w: f64| w * count as f64);
+    let doubt = if seen.is_crowded() || !crowded.is_empty() { DOUBT } else { 1.0 };
     let known =
         (!crowded.is_empty()).then(|| Known { exact: cut.into(), crowded: crowded.into(), rays, found: found.into() });
     // where no lamp shines it may be dark inside of something
@@ -307,14 +313,21 @@ pub(super) fn fit(
         coefficients.extend(own.iter().map(|c| 0.5 * (c[0] + c[1])));
         // n functions took n degrees of freedom
         let square = noise / alive;
-        misfit.push(if square == 0.0 {
+        // mean square of what the functions cannot say, and its standard deviation
+        let (said, certainty) = (product / freedom, 2.0 * square / freedom.sqrt());
+        let root = MEAN_OF_ROOT * said.max(0.0).sqrt();
+        let mut scattered = (square * n as f64 / alive).sqrt();
+        let found = if square == 0.0 {
             missed / (alive * freedom).sqrt()
-        } else if product / freedom > SIGNIFICANT * 2.0 * square / freedom.sqrt() {
-            MEAN_OF_ROOT * (product / freedom).sqrt()
+        } else if said > SIGNIFICANT * certainty {
+            root
         } else {
+            // what scatter may hide, less what it would pretend: more rays tell
+            scattered = scattered.hypot((root - FLOOR * certainty.sqrt()).max(0.0) / MEAN_OF_SCATTER);
             0.0
-        } as f32);
-        scatter.push((square * n as f64 / alive).sqrt() as f32);
+        };
+        misfit.push((doubt * found) as f32);
+        scatter.push((doubt * scattered) as f32);
     }
     Fit { coefficients, misfit, scatter, lit: share, work, known }
 }

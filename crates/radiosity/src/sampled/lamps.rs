@@ -21,6 +21,8 @@ pub(super) const MOST_LAMPS: usize = 4096;
 const MOST_GROUPS: usize = 32;
 /// Blockers up to which the visible part of a lamp is cut out exactly; beyond, rays decide.
 const MOST_BLOCKERS: usize = 24;
+/// Blockers from which a lamp counts as behind many things.
+const CROWD: usize = 8;
 /// Share of a lamp below which its visible part counts as a crack.
 const SLIVER: f64 = 2e-6;
 /// Share of an element's light from which a lamp is worth a look at what stands before it: in units of the promised
@@ -91,6 +93,11 @@ impl Seen {
     /// Whether something may stand in the way of one.
     pub(super) fn is_masked(&self) -> bool {
         !self.crowded.is_empty() || self.exact.iter().any(|s| !s.patches.is_empty())
+    }
+
+    /// Whether one is behind many things, even if they can be named.
+    pub(super) fn is_crowded(&self) -> bool {
+        !self.crowded.is_empty() || self.exact.iter().any(|s| s.patches.len() > CROWD)
     }
 
     /// Work at a point to cut lamps out exactly, in rays about.

@@ -12,7 +12,7 @@ use ondelette_compress::NodeId;
 
 /// The estimate of the mean absolute error times this is above it also where estimates are low: among furniture, and
 /// at the sharpest edges.
-const SAFETY: f64 = 1.3;
+const SAFETY: f64 = 1.35;
 /// Share of the promise that is aimed at.
 pub(super) const AIM: f64 = 0.95;
 /// Mean absolute value of a scattered number, over its standard deviation.
@@ -29,9 +29,6 @@ const OVERLAP: [f64; 2] = [1.0, 2.2];
 const POWER: f64 = 0.7;
 /// Most directions of a point and half.
 pub(super) const MOST_DIRECTIONS: f64 = 65_536.0;
-/// Elements to either side in the list that say how noisy an element is, too, and how many points' word that is worth.
-const NEARBY: usize = 4;
-const NEARBY_POINTS: f64 = 8.0;
 /// Most growth of an element's directions in a round.
 const GROWTH: f64 = 32.0;
 /// Mean absolute value of a misfit over its root mean square.
@@ -39,7 +36,7 @@ const MEAN_OF_MISFIT: f64 = 0.8;
 /// A misfit below this share of what is allowed is not worth a split.
 const WORTHY: f64 = 1.0 / 400.0;
 /// Mean root of the positive part of a scattered number of mean 0, over the root of its standard deviation.
-const FLOOR: f64 = 0.4;
+pub(super) const FLOOR: f64 = 0.4;
 /// A misfit larger than this many of its standard deviations is one.
 const SIGNIFICANT: f64 = 1.5;
 /// Most rays of a point to the lamps where they scatter, and the factor of them below which more are not worth it.
@@ -367,38 +364,19 @@ impl Sampled {
         (fresh, draws)
     }
 
-    /// Noise at the points of each element as it would be by what a direction says there and nearby: elements beside one
-    /// another in the list mostly lie beside one another. What few samples say of one element alone is itself noise,
-    /// and samples would be given to those that look worse than they are.
-    fn noise_nearby(&self) -> Vec<f64> {
-        let square = |k: usize| self.verdicts[k].per_direction.powi(2);
-        let points = |k: usize| f64::from(self.gathers[k].points());
-        let count = self.gathers.len();
-        (0..count)
-            .map(|k| {
-                let window = k.saturating_sub(NEARBY)..(k + NEARBY + 1).min(count);
-                let (sum, weight) = window.fold((0.0, 0.0), |(s, w), j| (s + points(j) * square(j), w + points(j)));
-                let own = points(k);
-                let mean = (own * square(k) + NEARBY_POINTS * sum / weight) / (own + NEARBY_POINTS);
-                (mean / f64::from(self.gathers[k].drawn.max(1))).sqrt()
-            })
-            .collect()
-    }
-
     /// The samples that bring the scatter down to `target`, where they do most.
     fn draws(&self, target: f64) -> Vec<Draw> {
         // the scatter of each element, predicted from the noise at its points (which is known better than the scatter
         // itself), scaled so that the sum is the measured one
         let (mut measured, mut predicted) = (0.0, 0.0);
         let mut elements = Vec::with_capacity(self.gathers.len());
-        let near = self.noise_nearby();
-        for ((gather, verdict), noise) in self.gathers.iter().zip(&self.verdicts).zip(near) {
+        for (gather, verdict) in self.gathers.iter().zip(&self.verdicts) {
             let node = self.forest.node(gather.node);
             if !self.counts(node.cell.root) {
                 elements.push((0.0, 1.0, 1.0));
                 continue;
             }
-            let weight = MEAN_OF_SCATTER * node.measure * noise * verdict.share;
+            let weight = MEAN_OF_SCATTER * node.measure * verdict.noise * verdict.share;
             predicted += weight;
             measured += MEAN_OF_SCATTER * node.measure * verdict.scatter;
             elements.push((weight, f64::from(gather.drawn.max(1)), f64::from(gather.points())));
