@@ -71,7 +71,7 @@ fn main() {
                 print!("{:>11}", "-");
                 continue;
             }
-            let t = median(if spans > 100 && surface { 3 } else { 7 }, || drop(run()));
+            let t = median(0.2, if spans > 100 && surface { 3 } else { 7 }, || drop(run()));
             fastest = fastest.min(t);
             by_method.push((method, t));
             print!("{:>11}", format!("{:.3}", t * 1e3));
