@@ -167,13 +167,21 @@ impl Forest {
     }
 
     /// The leaf over the root-local point `x`, and the point in its coordinates. Cost O(depth).
-    pub fn locate(&self, root: usize, mut x: [f64; 2]) -> (NodeId, [f64; 2]) {
-        let mut id = self.roots[root];
-        while !self.is_leaf(id) {
-            let (c, local) = self.node(id).cell.shape.descend(x);
-            (id, x) = (self.child(id, c), local);
+    pub fn locate(&self, root: usize, x: [f64; 2]) -> (NodeId, [f64; 2]) {
+        self.locate_below(self.roots[root], x)
+    }
+
+    /// The same, from any node and a point in that node's coordinates.
+    pub fn locate_below(&self, mut id: NodeId, mut x: [f64; 2]) -> (NodeId, [f64; 2]) {
+        let shape = self.node(id).cell.shape;
+        loop {
+            let first = self.nodes[id.index()].first_child;
+            if first == 0 {
+                return (id, x);
+            }
+            let (c, local) = shape.descend(x);
+            (id, x) = (NodeId(first + c as u32), local);
         }
-        (id, x)
     }
 }
 

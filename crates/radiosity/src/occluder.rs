@@ -54,12 +54,16 @@ impl Facet {
             return None;
         }
         let t = self.normal.dot(self.origin - a) / slope;
-        let p = a + d * t - self.origin;
+        self.holds(a + d * t - self.origin).then_some(t)
+    }
+
+    /// Whether a point of the plane, seen from the corner, lies on the patch or its rim.
+    #[inline]
+    fn holds(&self, p: DVec3) -> bool {
         let (u, v) = (self.to_s.dot(p), self.to_t.dot(p));
         let [rim_u, rim_v, rim_sum] = self.edge;
-        let far = if self.triangle { u + v <= 1.0 + rim_sum } else { u <= 1.0 + rim_u && v <= 1.0 + rim_v };
-        let inside = u >= -rim_u && v >= -rim_v && far;
-        inside.then_some(t)
+        let far = if self.triangle { u + v <= 1.0 + rim_sum } else { (u <= 1.0 + rim_u) & (v <= 1.0 + rim_v) };
+        (u >= -rim_u) & (v >= -rim_v) & far
     }
 }
 
@@ -190,28 +194,31 @@ impl Occluders {
         let ray = self.ray(from, direction * stretch, f32::INFINITY);
         // where the ray starts is skipped by name, so this only has to beat rounding
         let least = self.rounding * stretch;
+        let (tie, shrink) = (TIE * stretch, 1.0 / stretch);
         let mut nearest: Option<(f64, bool, u32)> = None;
         let mut hit = RayHit::none();
         self.wide.ray_traverse(ray, &mut hit, |_, id| {
             let patch = self.wide.primitive_indices[id];
             let facet = &self.facets[patch as usize];
-            let front = facet.normal.dot(direction) < 0.0;
-            match facet.crossing(from, direction) {
-                Some(t) if t > least && !skips(patch, front) => {
-                    // of two faces at the same place the one whose front is met counts, then the later one, which
-                    // covers the earlier, whatever the order of traversal
-                    let better = |(best, best_front, at): (f64, bool, u32)| {
-                        let tie = (t - best).abs() <= TIE * stretch;
-                        if tie { (front, patch) > (best_front, at) } else { t < best }
-                    };
-                    if nearest.is_none_or(better) {
-                        nearest = Some((t, front, patch));
-                    }
-                    // a little farther than it is, so that rounding to f32 hides nothing in front of it
-                    ((t / stretch + RUN_UP) * (1.0 + 1e-6)) as f32
-                }
-                _ => f32::INFINITY,
+            let slope = facet.normal.dot(direction);
+            let front = slope < 0.0;
+            if slope == 0.0 || skips(patch, front) {
+                return f32::INFINITY;
             }
+            let from_corner = from - facet.origin;
+            let t = -facet.normal.dot(from_corner) / slope;
+            // of two faces at the same place the one whose front is met counts, then the later one, which covers the
+            // earlier, whatever the order of traversal
+            let better = |(best, best_front, at): (f64, bool, u32)| {
+                let tie = (t - best).abs() <= tie;
+                if tie { (front, patch) > (best_front, at) } else { t < best }
+            };
+            if t <= least || !nearest.is_none_or(better) || !facet.holds(from_corner + direction * t) {
+                return f32::INFINITY;
+            }
+            nearest = Some((t, front, patch));
+            // a little farther than it is, so that rounding to f32 hides nothing in front of it
+            ((t * shrink + RUN_UP) * (1.0 + 1e-6)) as f32
         });
         let (t, front, patch) = nearest?;
         let facet = &self.facets[patch as usize];

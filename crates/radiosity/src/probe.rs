@@ -90,7 +90,7 @@ impl<'a> Prober<'a> {
     pub fn irradiance(&self, side: usize, at: [f64; 2]) -> Rgb {
         let (leaf, _) = self.solution.forest().locate(side, at);
         let lit = self.solution.lit()[leaf.index()];
-        if lit < 1.0 && (lit == 0.0 || self.kernel.is_buried(side, self.solution.point(side, at))) {
+        if lit < 1.0 && self.kernel.is_buried(side, self.solution.point(side, at)) {
             return Rgb::BLACK;
         }
         let exact = self.exact.as_ref();

@@ -47,6 +47,10 @@ pub struct View {
     /// Normal of the source's front, and the distance of the point from its plane.
     source_normal: DVec3,
     height: f64,
+    /// The source above the horizon, relative to the point, and the inward normals of the planes through the point and
+    /// its edges; these are empty until they are asked for.
+    source: Vec<DVec3>,
+    outline: Vec<DVec3>,
     pieces: Pieces,
     next: Pieces,
     /// The blocker at hand: corners relative to the point, and the inward normals of the planes of its edges.
@@ -111,6 +115,8 @@ impl View {
             normal: DVec3::Z,
             source_normal: DVec3::Z,
             height: 0.0,
+            source: Vec::new(),
+            outline: Vec::new(),
             pieces: Pieces::default(),
             next: Pieces::default(),
             cone: Vec::new(),
@@ -129,6 +135,7 @@ impl View {
     pub fn aim(&mut self, point: DVec3, normal: DVec3, source: &[DVec3]) -> bool {
         self.pieces.clear();
         self.late.clear();
+        self.outline.clear();
         self.point = point;
         self.normal = normal;
         let Some(&first) = source.first() else { return false };
@@ -146,6 +153,7 @@ impl View {
             return false;
         }
         self.pieces.push(&self.cone);
+        self.source.clone_from(&self.cone);
         true
     }
 
@@ -161,6 +169,9 @@ impl View {
         let (n, point, tolerance) = (self.normal, self.point, self.tolerance);
         self.cone.clear();
         self.cone.extend(blocker.iter().map(|c| *c - point));
+        if self.is_beside() {
+            return;
+        }
         clip(&mut self.cone, &mut self.rest, n, 0.0, tolerance);
         clip(&mut self.cone, &mut self.rest, self.source_normal, self.height, tolerance);
         self.subtract();
@@ -207,6 +218,20 @@ impl View {
     /// Where [`View::is_exact`] is false, blockers that came late are not cut out of them.
     pub fn parts(&self) -> impl Iterator<Item = &[DVec3]> {
         self.pieces.iter()
+    }
+
+    /// Whether `self.cone` lies beside the source, beyond one of its edges.
+    fn is_beside(&mut self) -> bool {
+        if self.outline.is_empty() {
+            let centre: DVec3 = self.source.iter().sum();
+            let mut a = self.source[self.source.len() - 1];
+            for &b in &self.source {
+                let n = a.cross(b);
+                self.outline.push(if n.dot(centre) < 0.0 { -n } else { n });
+                a = b;
+            }
+        }
+        self.outline.iter().any(|plane| self.cone.iter().all(|p| plane.dot(*p) <= 0.0))
     }
 
     /// Takes `self.cone` out of every piece.

@@ -79,9 +79,9 @@ pub struct Verifier {
 /// Points of one step: some ten milliseconds of work.
 const BATCH: usize = 32;
 /// Paths of a third times the square of the promise: so many that 2,000 points decide about most errors.
-const PATHS: f64 = 0.5;
+const PATHS: f64 = 2.0;
 /// Fewest and most of the square root of a third's paths.
-const STEPS: (u32, u32) = (4, 96);
+const STEPS: (u32, u32) = (4, 160);
 /// What tells the points' random numbers from the paths'.
 const STREAM: u64 = 0x706f_696e_7473;
 /// The golden ratio: steps of it fill an interval evenly, wherever one stops.

@@ -61,10 +61,12 @@ impl LightKernel {
                 let (origin, u, v) = scene.frame(side);
                 let patch = &scene.patches[side.patch as usize];
                 let material = scene.material(side);
+                let (normal, along) = (u.cross(v).normalize(), u.normalize());
                 SideFrame {
                     origin,
                     edges: [u, v],
-                    normal: u.cross(v).normalize(),
+                    normal,
+                    tangents: [along, normal.cross(along)],
                     area: patch.area(),
                     patch: side.patch,
                     shoots: material.radiance.max() > 0.0 || material.reflectance.max() > 0.0,

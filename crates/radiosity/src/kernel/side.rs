@@ -12,6 +12,8 @@ pub struct SideFrame {
     pub edges: [DVec3; 2],
     /// Unit normal.
     pub normal: DVec3,
+    /// Unit vectors that make a right-handed frame with the normal; the first lies along the first edge.
+    pub tangents: [DVec3; 2],
     /// Area of the side.
     pub area: f64,
     /// Patch that this side belongs to.

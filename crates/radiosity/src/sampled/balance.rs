@@ -209,7 +209,7 @@ impl Sampled {
     /// What all this says of each element: the field that is shown, and its scatter.
     fn settle(&mut self, apart: &[[f64; 3]], passed: &[[f64; 3]]) {
         let stride = self.forest.stride();
-        let noise = |k: usize| self.verdicts[k].noise;
+        let noise = |k: usize| self.verdicts[k].noise.hypot(self.verdicts[k].misfit.max(0.0).sqrt());
         let [smooth, apart] = stitch::stitched(&self.forest, &self.gathers, [&self.indirect, apart], noise);
         // elements that met nothing bright may just have missed it: they are as uncertain as others were at first
         let (mut area, mut square) = (0.0, 0.0);

@@ -3,7 +3,7 @@
 //! Where nothing stands between, the light is smooth: interpolation at Gauss points, judged at test points. Where
 //! something may, it has edges: least squares over a fine grid, judged by its own residuals.
 
-use super::lamps::{Lamps, on_cell};
+use super::lamps::{Crowded, Lamps, Seen, on_cell};
 use crate::kernel::LightKernel;
 use crate::visible::View;
 use ondelette_compress::{Cell, Forest};
@@ -21,6 +21,10 @@ pub(super) struct Fit {
     pub(super) scatter: Vec<f32>,
     /// Share of the element that is not inside of something.
     pub(super) lit: f64,
+    /// Work that it took, in rays about: what was cut out exactly, and rays.
+    pub(super) work: [f64; 2],
+    /// What a fit with more rays need not find out again, if there is anything for rays to find.
+    pub(super) known: Option<Known>,
 }
 
 /// A fit to samples on a grid, by least squares.
@@ -86,13 +90,15 @@ impl Grid {
         Grid { points, values, matrix }
     }
 
+    /// Coefficients of the constant 1.
+    fn one(&self) -> impl Iterator<Item = f64> {
+        self.matrix.chunks(self.points.len()).map(|row| row.iter().sum())
+    }
+
     /// Samples to coefficients by the `lit` points alone; what they leave open is pulled to their mean.
     fn part(&self, lit: &[bool], n: usize) -> Vec<f64> {
         let count = self.points.len();
         let alive = lit.iter().filter(|l| **l).count();
-        if alive == 0 {
-            return vec![0.0; n * count];
-        }
         let share = 1.0 / alive as f64;
         let mut gram = vec![0.0; n * n];
         for (row, _) in self.values.chunks(n).zip(lit).filter(|(_, lit)| **lit) {
@@ -103,7 +109,7 @@ impl Grid {
             }
         }
         // coefficients of the constant 1, and what it leaves
-        let one: Vec<f64> = self.matrix.chunks(count).map(|row| row.iter().sum()).collect();
+        let one: Vec<f64> = self.one().collect();
         let constant: Vec<f64> = (0..n).map(|i| (0..n).map(|j| gram[i * n + j] * one[j]).sum()).collect();
         (0..n).for_each(|i| gram[i * n + i] += 1e-4);
         let inverse = dense::inverse(&gram, n);
@@ -120,55 +126,129 @@ impl Grid {
     }
 }
 
+/// The corners of a cell, a little way in.
+fn corners(shape: CellShape) -> &'static [[f64; 2]] {
+    match shape {
+        CellShape::Triangle => &[[0.01, 0.01], [0.98, 0.01], [0.01, 0.98]],
+        _ => &[[0.01, 0.01], [0.99, 0.01], [0.01, 0.99], [0.99, 0.99]],
+    }
+}
+
+/// The corners of a cell that are not inside of something.
+pub(super) fn open_corners(kernel: &LightKernel, cell: &Cell) -> Vec<[f64; 2]> {
+    let element = kernel.element(cell);
+    let open = |x: &&[f64; 2]| !kernel.is_buried(cell.root as usize, element.point(**x));
+    corners(cell.shape).iter().filter(open).copied().collect()
+}
+
+/// Share of an element that is not inside of something, from how many of its points and corners are not: where all
+/// points are alike, a corner that is not is worth a part of a point.
+fn share_of(open: usize, points: usize, open_corners: usize, corners: usize) -> f64 {
+    let corner = 0.25 / points as f64;
+    if open == points {
+        1.0 - corner * (corners - open_corners) as f64
+    } else if open == 0 {
+        corner * open_corners as f64
+    } else {
+        open as f64 / points as f64
+    }
+}
+
 /// A misfit below this many of its standard deviations is taken for scatter.
 const SIGNIFICANT: f64 = 1.0;
 
+/// What a fit found out on an element, for fits with more rays to go on from.
+#[derive(Clone, Debug)]
+pub(super) struct Known {
+    /// What is cut out exactly, at the points of the grid, `[group][point]`.
+    exact: Box<[f64]>,
+    /// What is left to rays, how many of a point there were, and what they found: of both halves, likewise.
+    crowded: Box<[Crowded]>,
+    rays: f64,
+    found: Box<[[f64; 2]]>,
+}
+
+impl Known {
+    /// Counted bytes.
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(&*self.exact) + size_of_val(&*self.crowded) + size_of_val(&*self.found)
+    }
+}
+
 /// Fits the light of the lamps on a cell; a point sends about `rays` to all lamps together that it may see past many
-/// things.
-pub(super) fn fit(kernel: &LightKernel, lamps: &Lamps, forest: &Forest, cell: &Cell, rays: f64) -> Fit {
+/// things. `known` is what an earlier fit of the same cell found.
+pub(super) fn fit(
+    kernel: &LightKernel,
+    lamps: &Lamps,
+    forest: &Forest,
+    cell: &Cell,
+    (rays, known): (f64, Option<&Known>),
+) -> Fit {
     let groups = lamps.groups.len();
     let basis = forest.basis(cell.shape);
     let n = basis.len();
-    let seen = lamps.seen_by(kernel, cell, rays);
+    let seen = if known.is_some() { Seen::default() } else { lamps.seen_by(kernel, cell) };
+    let crowded = known.map_or(&seen.crowded[..], |k| &k.crowded);
     let element = kernel.element(cell);
     let is_buried = |x: [f64; 2]| kernel.is_buried(cell.root as usize, element.point(x));
-    if seen.is_empty() {
+    let zero = vec![0.0; groups];
+    if known.is_none() && seen.is_empty() {
         let grid = Grid::of(basis, cell.key);
+        let points = grid.points.len() as f64;
         let open = grid.points.iter().filter(|x| !is_buried(**x)).count();
-        let lit = open as f64 / grid.points.len() as f64;
-        let zero = vec![0.0; groups];
-        return Fit { coefficients: vec![0.0; groups * n], misfit: zero.clone(), scatter: zero, lit };
+        let lit = share_of(open, grid.points.len(), open_corners(kernel, cell).len(), corners(cell.shape).len());
+        let coefficients = vec![0.0; groups * n];
+        return Fit { coefficients, misfit: zero.clone(), scatter: zero, lit, work: [points, 0.0], known: None };
     }
-    let masked = seen.iter().any(|s| s.is_masked()) || kernel.has_covers(cell.root as usize);
     let mut view = View::new(kernel.occluders().tolerance());
-    // values of both halves at the points, `[group][point]`
-    let sample = |view: &mut View, points: &mut dyn Iterator<Item = [f64; 2]>, count: usize| {
-        let mut values = vec![[0.0; 2]; groups * count];
-        let mut out = vec![[0.0; 2]; groups];
+    // at points, `[group][point]`
+    let exact = |view: &mut View, points: &mut dyn Iterator<Item = [f64; 2]>, count: usize| {
+        let mut values = vec![0.0; groups * count];
+        let mut out = vec![0.0; groups];
         for (q, local) in points.enumerate() {
             let x = element.point(local);
-            out.fill([0.0; 2]);
+            out.fill(0.0);
             if !kernel.is_covered(cell.root as usize, x) {
-                let at = (cell.root as usize, x, element.normal());
-                lamps.irradiance(kernel, view, &seen, at, seed::combine(cell.key, q as u64), &mut out);
+                lamps.exact(kernel, view, &seen, (x, element.normal()), &mut out);
             }
-            for (g, o) in out.iter().enumerate() {
-                values[g * count + q] = *o;
+            (0..groups).for_each(|g| values[g * count + q] = out[g]);
+        }
+        values
+    };
+    // what rays find there, of both halves; those that were drawn count, too
+    let by_rays = |points: &[[f64; 2]], before: Option<&Known>| {
+        let mut values = before.map_or_else(|| vec![[0.0; 2]; groups * points.len()], |k| k.found.to_vec());
+        let drawn = before.map_or(0.0, |k| k.rays);
+        let fresh = (rays - drawn).max(0.0);
+        if fresh == 0.0 {
+            return values;
+        }
+        values.iter_mut().flatten().for_each(|v| *v *= drawn / rays);
+        let mut out = vec![[0.0; 2]; groups];
+        for (q, local) in points.iter().enumerate().filter(|_| !crowded.is_empty()) {
+            let x = element.point(*local);
+            if kernel.is_covered(cell.root as usize, x) {
+                continue;
+            }
+            out.fill([0.0; 2]);
+            let key = seed::combine(seed::combine(cell.key, q as u64), drawn.to_bits());
+            lamps.by_rays(kernel, (crowded, fresh), (cell.root as usize, x, element.normal()), key, &mut out);
+            for (g, out) in out.iter().enumerate() {
+                (0..2).for_each(|h| values[g * points.len() + q][h] += out[h] * (fresh / rays));
             }
         }
         values
     };
     let (mut misfit, mut scatter) = (Vec::with_capacity(groups), Vec::with_capacity(groups));
     let mut coefficients = Vec::with_capacity(groups * n);
-    if !masked {
+    if known.is_none() && !seen.is_masked() && !kernel.has_covers(cell.root as usize) {
         let analysis = basis.analysis(basis.order());
         let tests = cell.shape.test_points();
         let fitted = analysis.points.len();
         let count = fitted + tests.len();
-        let values = sample(&mut view, &mut analysis.points.iter().chain(&tests).copied(), count);
+        let values = exact(&mut view, &mut analysis.points.iter().chain(&tests).copied(), count);
         let mut functions = [0.0; 36];
         for values in values.chunks(count) {
-            let values: Vec<f64> = values.iter().map(|v| v[0]).collect();
             let own = analysis.coefficients(&values[..fitted]);
             let mut missed = 0.0;
             for (x, value) in tests.iter().zip(&values[fitted..]) {
@@ -179,20 +259,39 @@ pub(super) fn fit(kernel: &LightKernel, lamps: &Lamps, forest: &Forest, cell: &C
             misfit.push((missed / tests.len() as f64) as f32);
             coefficients.extend(own);
         }
-        return Fit { coefficients, misfit, scatter: vec![0.0; groups], lit: 1.0 };
+        let work = [seen.work() * count as f64, 0.0];
+        return Fit { coefficients, misfit, scatter: zero, lit: 1.0, work, known: None };
     }
     let grid = Grid::of(basis, cell.key);
     let count = grid.points.len();
-    let values = sample(&mut view, &mut grid.points.iter().copied(), count);
+    let cut = known.map_or_else(|| exact(&mut view, &mut grid.points.iter().copied(), count), |k| k.exact.to_vec());
+    let found = by_rays(&grid.points, known);
+    let values: Vec<[f64; 2]> = found.iter().zip(&cut).map(|(found, cut)| found.map(|f| f + cut)).collect();
+    let fresh = rays - known.map_or(0.0, |k| k.rays);
+    let work = [seen.work(), crowded.iter().map(|c| fresh * f64::from(c.1)).sum()].map(|w: f64| w * count as f64);
+    let known =
+        (!crowded.is_empty()).then(|| Known { exact: cut.into(), crowded: crowded.into(), rays, found: found.into() });
     // where no lamp shines it may be dark inside of something
     let dark = |q: usize| (0..groups).all(|g| values[g * count + q] == [0.0; 2]) && is_buried(grid.points[q]);
     let lit: Vec<bool> = (0..count).map(|q| !dark(q)).collect();
     let alive = lit.iter().filter(|l| **l).count();
+    let tips = open_corners(kernel, cell);
+    let share = share_of(alive, count, tips.len(), corners(cell.shape).len());
+    if alive == 0 {
+        // all that sticks out is a corner or two
+        let (cut, found) = (exact(&mut view, &mut tips.iter().copied(), tips.len()), by_rays(&tips, None));
+        let values: Vec<f64> = found.iter().zip(&cut).map(|(f, cut)| 0.5 * (f[0] + f[1]) + cut).collect();
+        for values in values.chunks(tips.len().max(1)).take(groups) {
+            let mean = values.iter().sum::<f64>() / tips.len() as f64;
+            coefficients.extend(grid.one().map(|one| one * mean));
+        }
+        coefficients.resize(groups * n, 0.0);
+        return Fit { coefficients, misfit: zero.clone(), scatter: zero, lit: share, work, known: None };
+    }
     let part = if alive == count { None } else { Some(grid.part(&lit, n)) };
     let matrix = part.as_ref().unwrap_or(&grid.matrix);
-    let share = alive as f64 / count as f64;
     let freedom = alive.saturating_sub(n).max(1) as f64;
-    let alive = alive.max(1) as f64;
+    let alive = alive as f64;
     for values in values.chunks(count) {
         let own: Vec<[f64; 2]> = matrix
             .chunks(count)
@@ -217,7 +316,7 @@ pub(super) fn fit(kernel: &LightKernel, lamps: &Lamps, forest: &Forest, cell: &C
         } as f32);
         scatter.push((square * n as f64 / alive).sqrt() as f32);
     }
-    Fit { coefficients, misfit, scatter, lit: share }
+    Fit { coefficients, misfit, scatter, lit: share, work, known }
 }
 
 /// Mean absolute value of a misfit, over its root mean square, about.

@@ -63,10 +63,13 @@ impl ExactDirect {
         let groups = &self.lamps.groups;
         let mut values = vec![[0.0; 2]; groups.len()];
         if !kernel.is_covered(side, point) {
-            let seen = self.lamps.seen_by(kernel, cell, RAYS);
+            let seen = self.lamps.seen_by(kernel, cell);
             let mut view = View::new(kernel.occluders().tolerance());
             let key = at.iter().fold(cell.key, |key, x| seed::combine(key, x.to_bits()));
-            self.lamps.irradiance(kernel, &mut view, &seen, (side, point, normal), key, &mut values);
+            let mut exact = vec![0.0; groups.len()];
+            self.lamps.exact(kernel, &mut view, &seen, (point, normal), &mut exact);
+            values.iter_mut().zip(exact).for_each(|(v, exact)| *v = [exact; 2]);
+            self.lamps.by_rays(kernel, (&seen.crowded, RAYS), (side, point, normal), key, &mut values);
         }
         let basis = forest.basis_of(leaf);
         let mut functions = [0.0; 36];

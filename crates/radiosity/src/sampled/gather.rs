@@ -6,11 +6,13 @@
 //! two independent halves of samples, which say how large their scatter is, and whether what the fit leaves over at the
 //! points is scatter or shape.
 
+use super::direct;
 use super::field::Field;
 use super::lamps::on_cell;
 use crate::kernel::LightKernel;
 use ondelette_compress::{Forest, NodeId};
-use ondelette_numerics::{dense, seed, sobol};
+use ondelette_numerics::sobol::Sobol;
+use ondelette_numerics::{dense, seed};
 use ondelette_wavelet::cell::{CellBasis, CellShape};
 use std::ops::Range;
 
@@ -107,6 +109,22 @@ impl Gather {
             others: Default::default(),
             order: 1,
             fit: Vec::new(),
+        }
+    }
+
+    /// If it has no point outside of things among the known ones, and the others, which are new, are inside as well,
+    /// moves these to corners that stick out, if any do.
+    pub(super) fn stick_out(&mut self, kernel: &LightKernel, forest: &Forest, known: u32) {
+        let cell = &forest.node(self.node).cell;
+        let element = kernel.element(cell);
+        let is_buried = |point: &Point| kernel.is_buried(cell.root as usize, element.point(point.at));
+        let (known, fresh) = self.points.split_at_mut(known as usize);
+        if self.lit[..known.len()].contains(&true) || !fresh.iter().all(is_buried) {
+            return;
+        }
+        let corners = direct::open_corners(kernel, cell);
+        for (point, corner) in fresh.iter_mut().zip(corners.iter().cycle()) {
+            point.at = *corner;
         }
     }
 
@@ -469,15 +487,14 @@ pub(super) fn cast(kernel: &LightKernel, forest: &Forest, gather: &Gather, draw:
         let covered = covers && kernel.is_covered(side, x);
         let mut only_backs = !covered;
         for (rays, half) in rays.iter_mut().zip([0u64, 1]) {
-            let key = seed::combine(point.key, half);
+            let sequence = Sobol::of(seed::combine(point.key, half));
             for index in draw.directions.clone() {
                 let nowhere = Ray { to: [0.0; 2], leaf: Ray::NOWHERE, point: p };
                 if covered {
                     rays.push(nowhere);
                     continue;
                 }
-                let [u, v, ..] = sobol::point(key, index);
-                let hit = kernel.first_hit_from(side, x, kernel.direction(side, [u, v]));
+                let hit = kernel.first_hit_from(side, x, kernel.direction(side, sequence.point(index)));
                 let met = hit.and_then(|hit| Some((hit, kernel.side_of(hit.patch, !hit.front)?)));
                 only_backs &= hit.is_some() && met.is_none();
                 rays.push(match met {
@@ -501,14 +518,10 @@ fn relocate(forest: &Forest, rays: &mut [Ray]) {
         if ray.leaf == Ray::NOWHERE {
             continue;
         }
-        let mut id = NodeId(ray.leaf);
-        let mut x = ray.to.map(f64::from);
-        while !forest.is_leaf(id) {
-            let (c, local) = forest.node(id).cell.shape.descend(x);
-            (id, x) = (forest.child(id, c), local);
-        }
-        if id.0 != ray.leaf {
-            (ray.leaf, ray.to) = (id.0, x.map(|x| x as f32));
+        let id = NodeId(ray.leaf);
+        if !forest.is_leaf(id) {
+            let (leaf, x) = forest.locate_below(id, ray.to.map(f64::from));
+            (ray.leaf, ray.to) = (leaf.0, x.map(|x| x as f32));
         }
     }
 }

@@ -11,7 +11,8 @@ use crate::scene::Scene;
 use crate::visible::View;
 use glam::DVec3;
 use ondelette_compress::Cell;
-use ondelette_numerics::{seed, sobol};
+use ondelette_numerics::seed;
+use ondelette_numerics::sobol::Sobol;
 use ondelette_wavelet::cell::CellShape;
 
 /// Emitters up to which each is a lamp of its own; fainter ones are met by rays.
@@ -64,28 +65,38 @@ impl Lamp {
     }
 }
 
-/// What stands between an element and a lamp.
+/// A lamp whose visible part is cut out exactly, and the patches that may stand before it.
 #[derive(Clone, Debug)]
-enum Between {
-    /// Nothing.
-    Nothing,
-    /// These patches may.
-    Patches(Vec<u32>),
-    /// Too many to name: rays decide, so many a point on average.
-    Many(f64),
-}
-
-/// One lamp as an element sees it.
-#[derive(Clone, Debug)]
-pub(super) struct Sight {
+struct Sight {
     lamp: u32,
-    between: Between,
+    patches: Vec<u32>,
 }
 
-impl Sight {
-    /// Whether something may stand in the way.
+/// A lamp behind so much that rays decide what is seen of it, and its share of the rays of a point.
+pub(super) type Crowded = (u32, f32);
+
+/// The lamps as an element sees them.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Seen {
+    exact: Vec<Sight>,
+    pub(super) crowded: Vec<Crowded>,
+}
+
+impl Seen {
+    /// Whether there is none.
+    pub(super) fn is_empty(&self) -> bool {
+        self.exact.is_empty() && self.crowded.is_empty()
+    }
+
+    /// Whether something may stand in the way of one.
     pub(super) fn is_masked(&self) -> bool {
-        !matches!(self.between, Between::Nothing)
+        !self.crowded.is_empty() || self.exact.iter().any(|s| !s.patches.is_empty())
+    }
+
+    /// Work at a point to cut lamps out exactly, in rays about.
+    pub(super) fn work(&self) -> f64 {
+        let one = |s: &Sight| if s.patches.is_empty() { 0.5 } else { 2.0 + 0.5 * s.patches.len() as f64 };
+        self.exact.iter().map(one).sum()
     }
 }
 
@@ -154,9 +165,8 @@ impl Lamps {
         self.is_lamp[side]
     }
 
-    /// The lamps that an element may see, and what may stand between; `rays` go from a point to those behind many
-    /// things.
-    pub(super) fn seen_by(&self, kernel: &LightKernel, cell: &Cell, rays: f64) -> Vec<Sight> {
+    /// The lamps that an element may see, and what may stand between.
+    pub(super) fn seen_by(&self, kernel: &LightKernel, cell: &Cell) -> Seen {
         let element = kernel.element(cell);
         let polygon = element.polygon();
         let (centre, radius) = element.ball();
@@ -189,13 +199,12 @@ impl Lamps {
             whole += potential;
             facing.push((k, potential));
         }
-        let mut seen = Vec::new();
+        let mut seen = Seen::default();
         for (k, potential) in facing {
             let share = potential / whole;
             let lamp = &self.lamps[k];
-            let many = Between::Many(rays * share);
             if share < self.worthy {
-                seen.push(Sight { lamp: k as u32, between: many });
+                seen.crowded.push((k as u32, share as f32));
                 continue;
             }
             let (a, b) = (polygon.corners(), lamp.polygon.corners());
@@ -204,70 +213,81 @@ impl Lamps {
             if patches.iter().any(|&p| kernel.occluders().hides(p, a, b)) {
                 continue;
             }
-            let between = match patches.len() {
-                0 => Between::Nothing,
-                1..=MOST_BLOCKERS => Between::Patches(patches),
-                _ => many,
-            };
-            seen.push(Sight { lamp: k as u32, between });
+            if patches.len() > MOST_BLOCKERS {
+                seen.crowded.push((k as u32, share as f32));
+            } else {
+                seen.exact.push(Sight { lamp: k as u32, patches });
+            }
         }
         seen
     }
 
-    /// Adds to `out[group]` the irradiance that the seen lamps bring to a point, for unit exitance: twice, once a half;
-    /// what rays decide is decided independently in each.
-    pub(super) fn irradiance(
+    /// Adds to `out[group]` the irradiance that lamps which are cut out exactly bring to a point of a side with a
+    /// normal, for unit exitance.
+    pub(super) fn exact(
         &self,
         kernel: &LightKernel,
         view: &mut View,
-        seen: &[Sight],
-        at: (usize, DVec3, DVec3),
-        key: u64,
-        out: &mut [[f64; 2]],
+        seen: &Seen,
+        (x, n): (DVec3, DVec3),
+        out: &mut [f64],
     ) {
-        let (side, x, n) = at;
         let occluders = kernel.occluders();
-        for sight in seen {
+        for sight in &seen.exact {
             let lamp = &self.lamps[sight.lamp as usize];
             if lamp.element.normal().dot(x - lamp.centre) <= 0.0 {
                 continue;
             }
             let covers = kernel.covers_of(lamp.side);
-            let exact = match &sight.between {
-                Between::Nothing if covers.is_empty() => point_to_polygon(x, n, &lamp.polygon.clipped(x, n)),
-                Between::Many(rays) => {
-                    let mut clipped = None;
-                    for (half, out) in out[lamp.group].iter_mut().enumerate() {
-                        // a whole number of rays, on average as many as planned; none for most of the faint lamps
-                        let key = seed::combine(seed::combine(key, half as u64), lamp.side as u64);
-                        let count = (0.5 * rays + seed::unit(key)).floor();
-                        if count == 0.0 {
-                            continue;
-                        }
-                        let polygon = clipped.get_or_insert_with(|| lamp.polygon.clipped(x, n));
-                        let chance = (0.5 * rays).min(1.0);
-                        *out += self.sampled(kernel, lamp, polygon, side, (x, n), (key, count as u32)) / chance;
-                    }
+            if sight.patches.is_empty() && covers.is_empty() {
+                out[lamp.group] += point_to_polygon(x, n, &lamp.polygon.clipped(x, n));
+                continue;
+            }
+            if !view.aim(x, n, lamp.polygon.corners()) {
+                continue;
+            }
+            for &cover in covers {
+                view.cover(&kernel.sides()[cover as usize].corners());
+            }
+            for &p in &sight.patches {
+                view.block(occluders.corners(p));
+            }
+            // what is left of a lamp behind a wall of pieces are the cracks between them
+            let open = view.irradiance();
+            if open > SLIVER * point_to_polygon(x, n, &lamp.polygon.clipped(x, n)) {
+                out[lamp.group] += open;
+            }
+        }
+    }
+
+    /// Adds to `out[group]` what lamps behind many things bring to a point of a side with a normal, for unit exitance:
+    /// twice, independently. On average `rays` go to all of them together.
+    pub(super) fn by_rays(
+        &self,
+        kernel: &LightKernel,
+        (crowded, rays): (&[Crowded], f64),
+        (side, x, n): (usize, DVec3, DVec3),
+        key: u64,
+        out: &mut [[f64; 2]],
+    ) {
+        for &(k, share) in crowded {
+            let lamp = &self.lamps[k as usize];
+            if lamp.element.normal().dot(x - lamp.centre) <= 0.0 {
+                continue;
+            }
+            let rays = rays * f64::from(share);
+            let mut clipped = None;
+            for (half, out) in out[lamp.group].iter_mut().enumerate() {
+                // a whole number of rays, on average as many as planned; none for most of the faint lamps
+                let key = seed::combine(seed::combine(key, half as u64), lamp.side as u64);
+                let count = (0.5 * rays + seed::unit(key)).floor();
+                if count == 0.0 {
                     continue;
                 }
-                between => {
-                    if !view.aim(x, n, lamp.polygon.corners()) {
-                        continue;
-                    }
-                    for &cover in covers {
-                        view.cover(&kernel.sides()[cover as usize].corners());
-                    }
-                    if let Between::Patches(patches) = between {
-                        for &p in patches {
-                            view.block(occluders.corners(p));
-                        }
-                    }
-                    // what is left of a lamp behind a wall of pieces are the cracks between them
-                    let open = view.irradiance();
-                    if open > SLIVER * point_to_polygon(x, n, &lamp.polygon.clipped(x, n)) { open } else { 0.0 }
-                }
-            };
-            out[lamp.group].iter_mut().for_each(|out| *out += exact);
+                let polygon = clipped.get_or_insert_with(|| lamp.polygon.clipped(x, n));
+                let chance = (0.5 * rays).min(1.0);
+                *out += self.sampled(kernel, lamp, polygon, side, (x, n), (key, count as u32)) / chance;
+            }
         }
     }
 
@@ -293,9 +313,10 @@ impl Lamps {
         let Some((last, _)) = cones.iter().flatten().last().copied().filter(|_| whole > 0.0) else { return 0.0 };
         let patches = [kernel.sides()[side].patch, lamp.patch];
         let m = lamp.element.normal();
+        let sequence = Sobol::of(key);
         let mut sum = 0.0;
         for i in 0..rays {
-            let [s, t, ..] = sobol::point(key, i);
+            let [s, t] = sequence.point(i);
             let at = s * whole;
             let chosen = cones.iter().flatten().find(|c| at < c.1);
             let (cone, end) = chosen.copied().unwrap_or((last, whole));

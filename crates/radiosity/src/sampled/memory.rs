@@ -4,6 +4,7 @@
 //! The first samples of every element, which iterations read over and over, always stay. The others are read once a
 //! sweep; a sweep of all samples costs their rays then, and the answer is the same but for rounding.
 
+use super::direct::Known;
 use super::gather::{Draw, Gather, Point, Ray};
 use super::{Phase, Sampled};
 use crate::solver::SolveError;
@@ -32,7 +33,8 @@ impl Sampled {
             + 2 * size_of::<f32>()
             + (1 + WORKING_ARRAYS) * coefficients;
         let gathers: usize = self.gathers.iter().map(|g| g.bytes() + (1 + WORKING_ARRAYS) * coefficients).sum();
-        (self.forest.len() * node + gathers) as u64
+        let known: usize = self.known.iter().flatten().map(Known::bytes).sum();
+        (self.forest.len() * (node + size_of::<Option<Known>>()) + known + gathers) as u64
     }
 
     /// Bytes of the first samples of all points, drawn or not.

@@ -19,6 +19,7 @@ mod lamps;
 mod memory;
 mod plan;
 mod positive;
+mod shares;
 mod sphere;
 mod stitch;
 
@@ -32,6 +33,7 @@ use crate::settings::Settings;
 use crate::solution::{Solution, Statistics};
 use crate::solver::{Event, SolveError};
 use balance::{Spread, Sweep};
+use direct::Known;
 use gather::{Draw, Gather, Verdict};
 use lamps::Lamps;
 use ondelette_compress::{Forest, Links, NodeId, transport};
@@ -87,6 +89,8 @@ pub(crate) struct Sampled {
     scatter: Vec<f32>,
     /// Rays a point to the lamps that it may see past many things.
     rays: Vec<f32>,
+    /// What was found out of the lamps of each leaf.
+    known: Vec<Option<Known>>,
     /// Share of each leaf that is not inside of something.
     lit: Vec<f32>,
     gathers: Vec<Gather>,
@@ -107,6 +111,10 @@ pub(crate) struct Sampled {
     corrections: u32,
     /// What share of the promise batches aim at.
     aim: f64,
+    /// How much more all errors together are than the root of the sum of their squares.
+    overlap: f64,
+    /// Work so far for direct light, in rays: what is cut out exactly, and what rays decide.
+    work: [f64; 2],
     rounds: u32,
     /// Whether direct light changed since the last balance.
     refitted: bool,
@@ -144,7 +152,11 @@ impl Sampled {
         }
         let leaves: Vec<NodeId> = (0..forest.len() as u32).map(NodeId).filter(|&id| forest.is_leaf(id)).collect();
         let fine = |id: NodeId| forest.node(id).measure > SMALL_SHARE * area;
-        let gathers: Vec<Gather> = leaves.iter().map(|&id| Gather::new(&forest, id, fine(id))).collect();
+        let gathers = par::map(leaves.len(), |k| {
+            let mut gather = Gather::new(&forest, leaves[k], fine(leaves[k]));
+            gather.stick_out(&kernel, &forest, 0);
+            gather
+        });
         let draw = |(k, gather): (usize, &Gather)| Gather::all(k, gather.points(), 0..FIRST_DIRECTIONS);
         let draws = gathers.iter().enumerate().map(draw).collect();
         let phase = Phase::Fitting { nodes: leaves, done: 0, draws };
@@ -166,6 +178,7 @@ impl Sampled {
             misfit: vec![0.0; nodes * lamps.groups.len()],
             scatter: vec![0.0; nodes * lamps.groups.len()],
             lit: vec![1.0; nodes],
+            known: vec![None; nodes],
             rays: vec![LEAST_LAMP_RAYS; nodes],
             verdicts: vec![Verdict::default(); gathers.len()],
             indirect: vec![[0.0; 3]; gathers.len() * stride],
@@ -184,6 +197,8 @@ impl Sampled {
             amplification: 1.0,
             corrections: 0,
             aim: plan::AIM,
+            overlap: 1.0,
+            work: [0.0; 2],
             rounds: 0,
             refitted: false,
             stalled: false,
@@ -244,8 +259,9 @@ impl Sampled {
         let count = (FITS_A_STEP / self.lamps.len().clamp(1, FITS_A_STEP / 16)).min(nodes.len() - done);
         let batch = &nodes[done..done + count];
         let fits = par::map(count, |i| {
-            let cell = self.forest.node(batch[i]).cell;
-            direct::fit(&self.kernel, &self.lamps, &self.forest, &cell, f64::from(self.rays[batch[i].index()]))
+            let (n, cell) = (batch[i].index(), self.forest.node(batch[i]).cell);
+            let before = (f64::from(self.rays[n]), self.known[n].as_ref());
+            direct::fit(&self.kernel, &self.lamps, &self.forest, &cell, before)
         });
         let (groups, stride) = (self.lamps.groups.len(), self.forest.stride());
         for (&id, fit) in batch.iter().zip(fits) {
@@ -259,6 +275,9 @@ impl Sampled {
             self.misfit[own.clone()].copy_from_slice(&fit.misfit);
             self.scatter[own].copy_from_slice(&fit.scatter);
             self.lit[id.index()] = fit.lit as f32;
+            (0..2).for_each(|k| self.work[k] += fit.work[k]);
+            // a cap on memory has better use for it
+            self.known[id.index()] = fit.known.filter(|_| self.cap.is_none());
         }
         self.statistics.kernel_samples += count as u64;
         self.refitted = true;
@@ -279,6 +298,7 @@ impl Sampled {
         let mut fresh = Vec::new();
         for &id in leaves {
             self.forest.split(id);
+            self.known[id.index()] = None;
             let arity = self.forest.node(id).cell.shape.arity();
             fresh.extend((0..arity).map(|c| self.forest.child(id, c)));
             self.irradiance.resize(self.forest.len() * stride, [0.0; 3]);
@@ -289,6 +309,7 @@ impl Sampled {
         self.misfit.resize(self.forest.len() * groups, 0.0);
         self.scatter.resize(self.forest.len() * groups, 0.0);
         self.lit.resize(self.forest.len(), 1.0);
+        self.known.resize(self.forest.len(), None);
         // smaller elements need fewer rays
         for &id in &fresh {
             let parent = self.rays[self.forest.node(id).parent.index()];

@@ -4,25 +4,34 @@
 //! (half the difference of two independent halves), and what the functions of the gathering elements cannot say (the
 //! product of both halves' misses, which is free of scatter on average).
 
-use super::gather::{Draw, Gather};
+use super::gather::{Draw, Gather, Verdict};
+use super::shares::{Kind, shares};
 use super::{Phase, Sampled};
 use crate::solver::Event;
 use ondelette_compress::NodeId;
 
-/// The estimate of the mean absolute error times this is above the root mean square of most surfaces, too.
-const SAFETY: f64 = 1.55;
+/// The estimate of the mean absolute error times this is above it also where estimates are low: among furniture, and
+/// at the sharpest edges.
+const SAFETY: f64 = 1.3;
 /// Share of the promise that is aimed at.
 pub(super) const AIM: f64 = 0.95;
-/// Shares of the aim for direct misfit, scatter, and the gathering elements' misfit: their squares add up to about 1.
-const SHARES: [f64; 3] = [0.35, 0.72, 0.55];
 /// Mean absolute value of a scattered number, over its standard deviation.
 pub(super) const MEAN_OF_SCATTER: f64 = 0.8;
-/// Share of the aim for the scatter of direct light, where rays decide what is seen: dear, and falling slowly.
-const LAMP_SCATTER: f64 = 0.55;
+/// To halve the misfit of direct light takes twice the work along edges, and in smooth parts; to halve the scatter where
+/// rays decide what is seen, four times.
+const MISFIT_POWER: f64 = 1.0;
+const LAMP_POWER: f64 = 2.0;
+/// Work that smaller gathering elements take, as a share of what rays take: their rays count as rays.
+const SPLITTING: f64 = 0.4;
+/// Limits of how much more all errors together are than the root of the sum of their squares.
+const OVERLAP: [f64; 2] = [1.0, 2.2];
 /// Scatter falls with this power of the samples.
 const POWER: f64 = 0.7;
 /// Most directions of a point and half.
 pub(super) const MOST_DIRECTIONS: f64 = 65_536.0;
+/// Elements to either side in the list that say how noisy an element is, too, and how many points' word that is worth.
+const NEARBY: usize = 4;
+const NEARBY_POINTS: f64 = 8.0;
 /// Most growth of an element's directions in a round.
 const GROWTH: f64 = 32.0;
 /// Mean absolute value of a misfit over its root mean square.
@@ -33,14 +42,14 @@ const WORTHY: f64 = 1.0 / 400.0;
 const FLOOR: f64 = 0.4;
 /// A misfit larger than this many of its standard deviations is one.
 const SIGNIFICANT: f64 = 1.5;
-/// Factor of the rays of a point to the lamps where they scatter too much, and most of them.
-const MORE_LAMP_RAYS: f32 = 4.0;
-const MOST_LAMP_RAYS: f32 = 16_384.0;
+/// Most rays of a point to the lamps where they scatter, and the factor of them below which more are not worth it.
+const MOST_LAMP_RAYS: f64 = 16_384.0;
+const ENOUGH_LAMP_RAYS: f64 = 1.2;
 /// Deepest split.
 const DEEPEST: u32 = 16;
-/// Rounds after which every round aims lower by as much as is missing; earlier, if no more than this factor is.
+/// Rounds after which every round aims lower by as much as is missing, within these limits.
 const PATIENT_ROUNDS: u32 = 3;
-const NEARLY: f64 = 0.65;
+const LOWER: [f64; 2] = [0.65, 0.95];
 /// Rounds after which nothing more is hoped for.
 const MOST_ROUNDS: u32 = 40;
 
@@ -50,6 +59,10 @@ impl Sampled {
         self.whole = self.integral(&self.irradiance);
         self.missed = self.missed_by_side();
         let missed: f64 = self.missed.iter().sum();
+        let apart = self.kinds().iter().map(|k| k.error * k.error).sum::<f64>().sqrt();
+        if apart > 0.0 {
+            self.overlap = (missed / apart).clamp(OVERLAP[0], OVERLAP[1]);
+        }
         self.error = if self.whole > 0.0 { SAFETY * missed / self.whole + unsolved } else { 0.0 };
         self.missed.iter_mut().for_each(|m| *m *= SAFETY);
         self.rounds += 1;
@@ -62,8 +75,8 @@ impl Sampled {
             self.phase = Phase::Finished;
         } else {
             let missing = self.settings.error / self.error;
-            if self.rounds > PATIENT_ROUNDS || self.rounds > 1 && missing > NEARLY {
-                self.aim *= missing.clamp(NEARLY, 0.95);
+            if self.rounds > PATIENT_ROUNDS {
+                self.aim *= missing.clamp(LOWER[0], LOWER[1]);
             }
             self.spend();
         }
@@ -123,27 +136,59 @@ impl Sampled {
         MEAN_OF_MISFIT * sure.max(sum)
     }
 
+    /// The kinds of error, as integrals: misfit and scatter of direct light, scatter of the gathered, and what its
+    /// elements cannot say.
+    fn kinds(&self) -> [Kind; 4] {
+        let (mut misfit, mut lamps) = (0.0, 0.0);
+        for (n, node) in self.forest.nodes().iter().enumerate() {
+            if node.first_child == 0 && self.counts(node.cell.root) {
+                let (own, scatter) = self.direct_error(n);
+                let area = node.measure * f64::from(self.lit[n]);
+                misfit += area * own;
+                lamps += area * scatter;
+            }
+        }
+        let (mut scatter, mut rays) = (0.0, 0.0);
+        for (gather, verdict) in self.gathers.iter().zip(&self.verdicts) {
+            let node = self.forest.node(gather.node);
+            rays += gather.samples() as f64;
+            if self.counts(node.cell.root) {
+                scatter += MEAN_OF_SCATTER * node.measure * verdict.scatter;
+            }
+        }
+        [
+            Kind { error: misfit, cost: self.work[0], power: MISFIT_POWER },
+            Kind { error: lamps, cost: self.work[1], power: LAMP_POWER },
+            Kind { error: scatter, cost: rays, power: 1.0 / POWER },
+            Kind { error: self.misfit_of_gathers(), cost: SPLITTING * rays, power: MISFIT_POWER },
+        ]
+    }
+
     /// Plans the next batch: direct light first, then the gathered.
     pub(super) fn spend(&mut self) {
         let mut values = self.direct_light();
         self.add_indirect(&self.indirect, &mut values);
         self.whole = self.integral(&values);
         loop {
-            let aim = self.aim * self.settings.error * self.whole / SAFETY;
-            let leaves = self.worst_leaves(SHARES[0] * aim);
-            let unclear = self.unclear_leaves(LAMP_SCATTER * aim, &leaves);
-            if !leaves.is_empty() && self.make_room(&[]) {
-                return self.stop_for_memory();
+            let aim = self.aim * self.settings.error * self.whole / (SAFETY * self.overlap);
+            let [direct, lamps, scatter, misfit] = shares(self.kinds(), aim);
+            let leaves = self.worst_leaves(direct);
+            if !leaves.is_empty() {
+                if self.make_room(&[]) {
+                    return self.stop_for_memory();
+                }
+                let nodes = self.split(&leaves);
+                self.phase = Phase::Fitting { nodes, done: 0, draws: Vec::new() };
+                return;
             }
-            if !leaves.is_empty() || !unclear.is_empty() {
-                let mut nodes = self.split(&leaves);
-                nodes.extend(unclear);
+            let nodes = self.unclear_leaves(lamps);
+            if !nodes.is_empty() {
                 self.phase = Phase::Fitting { nodes, done: 0, draws: Vec::new() };
                 return;
             }
             // children need direct light as well
-            let (nodes, mut draws) = self.split_gathers(SHARES[2] * aim);
-            draws.extend(self.draws(SHARES[1] * aim));
+            let (nodes, mut draws) = self.split_gathers(misfit);
+            draws.extend(self.draws(scatter));
             if self.make_room(&draws) {
                 return self.stop_for_memory();
             }
@@ -157,7 +202,7 @@ impl Sampled {
                 return;
             }
             // every part is within its share, and yet the sum is not
-            self.aim *= 0.8;
+            self.aim *= 0.93;
             if self.aim < 0.05 {
                 self.stalled = true;
                 self.phase = Phase::Finished;
@@ -194,36 +239,43 @@ impl Sampled {
         leaves
     }
 
-    /// The leaves whose view of the lamps scatters most, as many as bring the sum down to `target` with more rays,
-    /// which they are given; not those that are split anyway.
-    fn unclear_leaves(&mut self, target: f64, split: &[NodeId]) -> Vec<NodeId> {
-        let mut worst: Vec<(f64, u32)> = Vec::new();
+    /// The leaves whose view of the lamps scatters too much for the sum to be `target`: they are given the rays that
+    /// bring it there, where they do most.
+    fn unclear_leaves(&mut self, target: f64) -> Vec<NodeId> {
+        // the scatter of one ray, as an integral over the leaf: n rays of a point leave its part 1 / sqrt(n)
+        let mut leaves: Vec<(usize, f64)> = Vec::new();
         let mut total = 0.0;
         for (n, node) in self.forest.nodes().iter().enumerate() {
             if node.first_child == 0 && self.counts(node.cell.root) {
-                let scatter = node.measure * self.direct_error(n).1;
-                total += scatter;
-                if scatter > 0.0 && self.rays[n] < MOST_LAMP_RAYS && split.binary_search(&NodeId(n as u32)).is_err() {
-                    worst.push((scatter / f64::from(self.rays[n]), n as u32));
+                let scatter = node.measure * f64::from(self.lit[n]) * self.direct_error(n).1;
+                if scatter > 0.0 {
+                    total += scatter;
+                    leaves.push((n, scatter * f64::from(self.rays[n]).sqrt()));
                 }
             }
         }
-        if total <= target {
+        if total <= target * (1.0 + 1e-3) {
             return Vec::new();
         }
-        worst.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        let mut rest = 1.5 * (total - target);
-        let mut leaves = Vec::new();
-        for (scatter, n) in worst {
-            if rest <= 0.0 {
-                break;
-            }
-            rest -= scatter * f64::from(self.rays[n as usize]);
-            self.rays[n as usize] *= MORE_LAMP_RAYS;
-            leaves.push(NodeId(n));
+        // least rays for a sum of scatter / sqrt(n): n in proportion to scatter^(2/3)
+        let wanted = |factor: f64, n: usize, one: f64| {
+            let now = f64::from(self.rays[n]);
+            (factor * one.powf(2.0 / 3.0)).clamp(now, MOST_LAMP_RAYS.max(now))
+        };
+        let sum = |factor: f64| leaves.iter().map(|&(n, one)| one / wanted(factor, n, one).sqrt()).sum::<f64>();
+        let (mut low, mut high) = (-700.0, 700.0);
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if sum(f64::exp(middle)) > target { low = middle } else { high = middle }
         }
-        leaves.sort_unstable();
-        leaves
+        let factor = f64::exp(high);
+        let given: Vec<(usize, f64)> = leaves.iter().map(|&(n, one)| (n, wanted(factor, n, one))).collect();
+        let more: Vec<(usize, f64)> =
+            given.into_iter().filter(|&(n, rays)| rays > ENOUGH_LAMP_RAYS * f64::from(self.rays[n])).collect();
+        for &(n, rays) in &more {
+            self.rays[n] = rays as f32;
+        }
+        more.into_iter().map(|(n, _)| NodeId(n as u32)).collect()
     }
 
     /// Splits the gathering elements that their functions do not fit; returns new leaves to be fitted, and what is to
@@ -245,7 +297,7 @@ impl Sampled {
             return Default::default();
         }
         worst.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        let mut rest = 1.5 * (total - target);
+        let mut rest = 1.3 * (total - target);
         let mut chosen: Vec<usize> = Vec::new();
         for (missed, k) in worst {
             if rest <= 0.0 || missed < WORTHY * target {
@@ -292,7 +344,9 @@ impl Sampled {
                 verdicts.push(self.verdicts[k]);
                 continue;
             }
-            for (c, (child, known)) in gather.split(&self.forest).into_iter().enumerate() {
+            let gather_points = gather.points();
+            for (c, (mut child, known)) in gather.split(&self.forest).into_iter().enumerate() {
+                child.stick_out(&self.kernel, &self.forest, known);
                 let mut values = vec![[0.0; 3]; stride];
                 let n = basis.len();
                 basis.push(c, &own[..n], &mut values[..n], |to: &mut [f64; 3], k, from: [f64; 3]| {
@@ -300,13 +354,35 @@ impl Sampled {
                 });
                 indirect.extend(values);
                 let points = known..child.points();
+                // fewer points for as many functions
+                let share = self.verdicts[k].share * (f64::from(gather_points) / f64::from(points.end)).sqrt();
+                let share = share.min(1.0);
                 draws.push(Draw { gather: gathers.len() as u32, points, directions: 0..child.drawn });
                 gathers.push(child);
-                verdicts.push(self.verdicts[k]);
+                let own = &self.verdicts[k];
+                verdicts.push(Verdict { share, scatter: own.scatter * share / own.share, ..*own });
             }
         }
         (self.gathers, self.indirect, self.verdicts) = (gathers, indirect, verdicts);
         (fresh, draws)
+    }
+
+    /// Noise at the points of each element as it would be by what a direction says there and nearby: elements beside one
+    /// another in the list mostly lie beside one another. What few samples say of one element alone is itself noise,
+    /// and samples would be given to those that look worse than they are.
+    fn noise_nearby(&self) -> Vec<f64> {
+        let square = |k: usize| self.verdicts[k].per_direction.powi(2);
+        let points = |k: usize| f64::from(self.gathers[k].points());
+        let count = self.gathers.len();
+        (0..count)
+            .map(|k| {
+                let window = k.saturating_sub(NEARBY)..(k + NEARBY + 1).min(count);
+                let (sum, weight) = window.fold((0.0, 0.0), |(s, w), j| (s + points(j) * square(j), w + points(j)));
+                let own = points(k);
+                let mean = (own * square(k) + NEARBY_POINTS * sum / weight) / (own + NEARBY_POINTS);
+                (mean / f64::from(self.gathers[k].drawn.max(1))).sqrt()
+            })
+            .collect()
     }
 
     /// The samples that bring the scatter down to `target`, where they do most.
@@ -315,13 +391,14 @@ impl Sampled {
         // itself), scaled so that the sum is the measured one
         let (mut measured, mut predicted) = (0.0, 0.0);
         let mut elements = Vec::with_capacity(self.gathers.len());
-        for (gather, verdict) in self.gathers.iter().zip(&self.verdicts) {
+        let near = self.noise_nearby();
+        for ((gather, verdict), noise) in self.gathers.iter().zip(&self.verdicts).zip(near) {
             let node = self.forest.node(gather.node);
             if !self.counts(node.cell.root) {
                 elements.push((0.0, 1.0, 1.0));
                 continue;
             }
-            let weight = MEAN_OF_SCATTER * node.measure * verdict.noise * verdict.share;
+            let weight = MEAN_OF_SCATTER * node.measure * noise * verdict.share;
             predicted += weight;
             measured += MEAN_OF_SCATTER * node.measure * verdict.scatter;
             elements.push((weight, f64::from(gather.drawn.max(1)), f64::from(gather.points())));

@@ -58,7 +58,7 @@ impl Cone {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ondelette_numerics::sobol;
+    use ondelette_numerics::sobol::Sobol;
 
     #[test]
     fn irradiance_by_directions_is_lamberts() {
@@ -74,8 +74,7 @@ mod tests {
             let n = 1 << 14;
             let mut sum = 0.0;
             for i in 0..n {
-                let [s, t, ..] = sobol::point(7, i);
-                let (d, density) = cone.direction([s, t]);
+                let (d, density) = cone.direction(Sobol::of(7).point(i));
                 sum += d.normalize().z / (density * std::f64::consts::PI);
             }
             let found = sum / f64::from(n);

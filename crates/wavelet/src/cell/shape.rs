@@ -35,10 +35,14 @@ impl CellShape {
     }
 
     /// The child that holds the local point `x`, and the point in that child's coordinates.
+    #[inline]
     pub fn descend(self, x: [f64; 2]) -> (usize, [f64; 2]) {
         let c = match self {
             CellShape::Interval => usize::from(x[0] >= 0.5),
-            CellShape::Square => usize::from(x[0] >= 0.5) + 2 * usize::from(x[1] >= 0.5),
+            CellShape::Square => {
+                let [i, j] = x.map(|x| usize::from(x >= 0.5));
+                return (i + 2 * j, [2.0 * x[0] - i as f64, 2.0 * x[1] - j as f64]);
+            }
             CellShape::Triangle => {
                 if x[0] >= 0.5 {
                     1
