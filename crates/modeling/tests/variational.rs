@@ -308,7 +308,7 @@ fn auto_solves_surfaces_of_any_number_of_spans() {
     assert_eq!(solved([37, 37], 20, false), Method::Cholesky);
     assert_eq!(solved([13, 64], 20, false), Method::Cholesky);
     assert_eq!(solved([32, 32], 20, true), Method::Cholesky);
-    assert_eq!(solved([32, 32], 150, false), Method::Cholesky);
+    assert_eq!(solved([32, 32], 150, false), Method::Bpx);
 }
 
 #[test]

@@ -16,7 +16,7 @@ const SMALL: usize = 10_000;
 /// Coefficients with varying stiffness up to which a sparse factor is faster than conjugate gradients.
 const STIFF: usize = 4500;
 
-/// Coefficients a row up to which the products of rows make conjugate gradients dear.
+/// Coefficients a row up to which constraints may be too crowded for a sparse factor to converge.
 const CROWDED: usize = 9;
 
 /// Unknowns that a sparse factor is made for unasked.
@@ -52,11 +52,8 @@ fn sparse_or_levels(problem: &Problem, h: &Operator) -> Result<(Method, &'static
     if coarsest > COARSE && n <= SMALL {
         return Ok((Method::Cholesky, "spans that do not halve often"));
     }
-    if !h.is_uniform() && n <= STIFF {
+    if !h.is_uniform() && n <= STIFF && rows * CROWDED < n {
         return Ok((Method::Cholesky, "varying stiffness on few spans"));
-    }
-    if n > COARSE && n <= SMALL && rows * CROWDED >= n {
-        return Ok((Method::Cholesky, "many constraints on few spans"));
     }
     Ok((Method::Bpx, "open axes or varying stiffness"))
 }
