@@ -290,6 +290,28 @@ fn creases_and_stiff_regions_have_one_solution_for_all_methods() {
 }
 
 #[test]
+fn auto_solves_surfaces_of_any_number_of_spans() {
+    let solved = |spans: [usize; 2], m: usize, stiff: bool| {
+        let [s, t] = spans.map(|n| Axis::new(Boundary::Open, n, [0.0, 1.0]).unwrap());
+        let space = Space::surface(s, t);
+        let unit = |k: u64, i: usize| seed::unit(seed::combine(k, i as u64));
+        let rows = (0..m).map(|i| point(i, &[unit(1, i), unit(2, i)], unit(3, i))).collect();
+        let factor = |c: usize| if c < 20 { 50.0 } else { 1.0 };
+        let map = stiff.then(|| Stiffness::new(space.cells(), (0..space.cells()).map(factor).collect()).unwrap());
+        let problem = Problem::new(space, 1, Energy::BEND, map, rows).unwrap();
+        let solution = solve(&problem, Method::Auto, 1e-8).unwrap();
+        assert!(solution.converged() && solution.residuals().iter().all(|r| r.miss.abs() < 1e-7), "{spans:?}");
+        solution.method().0
+    };
+    assert_eq!(solved([32, 32], 20, false), Method::Bpx);
+    // Nothing to halve: levels would have to factor all coefficients densely.
+    assert_eq!(solved([37, 37], 20, false), Method::Cholesky);
+    assert_eq!(solved([13, 64], 20, false), Method::Cholesky);
+    assert_eq!(solved([32, 32], 20, true), Method::Cholesky);
+    assert_eq!(solved([32, 32], 150, false), Method::Bpx);
+}
+
+#[test]
 fn periodic_axes_close() {
     let circle = |i: usize| {
         let angle = std::f64::consts::TAU * i as f64 / 5.0;

@@ -60,6 +60,13 @@ fn an_adaptive_surface_says_how_few_wavelets_hold_it() {
     let over = number(&few, "energy") / number(&all, "energy") - 1.0;
     assert!((0.0..1e-3).contains(&over) && over * number(&all, "energy") <= number(&few, "excess"), "{over}");
     assert!(["a", "b", "c"].iter().all(|id| number(&few["residuals"], id).abs() < 1e-12));
+    // So small a surface is solved sooner with all wavelets, and the program says so; a large one is not.
+    assert_eq!((&few["adaptive"]["faster_than_full"], &all["adaptive"]), (&json!(false), &Value::Null));
+    assert!(ended.err.contains("not expected to be faster"), "{}", ended.err);
+    place.write("large.json", spec.replace("ADAPTIVE", "\"adaptive\": true,").replace("5,", "8,"));
+    let ended = place.run("surface large.json -o large.npy --report large-r.json").with_code(0);
+    assert_eq!(document(&place, "large-r.json")["adaptive"]["faster_than_full"], json!(true));
+    assert!(!ended.err.contains("not expected"), "{}", ended.err);
 }
 
 #[test]

@@ -2,25 +2,35 @@
 
 use std::time::Instant;
 
-/// Seconds of CPU time so far (Linux), else of wall time since `origin`.
-fn now(origin: Instant) -> f64 {
-    let read = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
-    let nanoseconds = read.as_deref().and_then(|s| s.split(' ').next()?.parse::<f64>().ok());
-    nanoseconds.map_or_else(|| origin.elapsed().as_secs_f64(), |n| n * 1e-9)
+/// Seconds of CPU time so far (to a microsecond; the scheduler's own statistics tick in milliseconds), where the system
+/// counts them, else of wall time since `origin`.
+#[cfg(unix)]
+fn now(_origin: Instant) -> f64 {
+    let t = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    t.tv_sec as f64 + t.tv_nsec as f64 * 1e-9
 }
 
-/// The median of several runs, in seconds. The clock may tick in milliseconds: short work is repeated within a run.
-pub(crate) fn median(runs: usize, mut f: impl FnMut()) -> f64 {
+#[cfg(not(unix))]
+fn now(origin: Instant) -> f64 {
+    origin.elapsed().as_secs_f64()
+}
+
+/// The median of batches of runs, in seconds a run: at least `least` batches of one run each, more runs a batch where
+/// these are short, so that a figure stands for about `work` seconds.
+pub(crate) fn median(work: f64, least: usize, mut f: impl FnMut()) -> f64 {
     let origin = Instant::now();
     f();
-    let once = origin.elapsed().as_secs_f64().max(1e-7);
-    let repeats = (0.08 / once).clamp(1.0, 5000.0) as usize;
-    let runs = if repeats > 1 { runs.clamp(1, 3) } else { runs.max(1) };
-    let mut times: Vec<f64> = (0..runs)
+    let from = now(origin);
+    f();
+    let once = (now(origin) - from).max(1e-7);
+    let batches = least.max(5);
+    let runs = (work / once / batches as f64).clamp(1.0, 1e6) as usize;
+    let batches = if once > 1.0 { 1 } else { batches };
+    let mut times: Vec<f64> = (0..batches)
         .map(|_| {
             let from = now(origin);
-            (0..repeats).for_each(|_| f());
-            (now(origin) - from) / repeats as f64
+            (0..runs).for_each(|_| f());
+            (now(origin) - from) / runs as f64
         })
         .collect();
     times.sort_by(f64::total_cmp);

@@ -174,7 +174,11 @@ impl Constraint {
                     return unfit("a curve has no second derivative direction: use the tangent");
                 }
                 count("the derivative", values.len(), coordinates)?;
-                finite("the derivative", &given(values))
+                finite("the derivative", &given(values))?;
+                if self.is_impossible(space) {
+                    return unfit("the derivative across a mirrored end is 0: use an open boundary, or leave it out");
+                }
+                Ok(())
             }
             Demand::Normal(normal) => {
                 if coordinates < 2 {
@@ -205,7 +209,11 @@ impl Constraint {
                 count("the factors", factors.len(), coordinates)?;
                 count("the offset", offset.len(), coordinates)?;
                 finite("the factors", factors)?;
-                finite("the offset", offset)
+                finite("the offset", offset)?;
+                if self.is_impossible(space) {
+                    return unfit("a point cannot differ from itself: give another place in of, or no offset");
+                }
+                Ok(())
             }
         }
     }

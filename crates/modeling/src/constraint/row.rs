@@ -74,14 +74,30 @@ pub(crate) fn along(space: &Space, axis: usize, order: usize) -> [usize; 2] {
 }
 
 impl Constraint {
-    /// Its linear rows with their targets; none for curvature, whose rows depend on the shape.
+    /// Its linear rows with their targets; none for curvature, whose rows depend on the shape, and none where all shapes
+    /// have the same.
     pub(crate) fn rows(&self, space: &Space, number: usize, out: &mut Vec<Row>) {
+        self.equations(space, |terms, target| out.extend(Row::new(number, terms, target, self.weight)));
+    }
+
+    /// True if it asks for something else where all shapes have the same: a slope across a mirrored end, or a point that
+    /// is an image of itself.
+    pub(crate) fn is_impossible(&self, space: &Space) -> bool {
+        let mut impossible = false;
+        if matches!(self.demand, Demand::Derivative(..) | Demand::Image { .. }) {
+            self.equations(space, |terms, b| impossible |= b != 0.0 && Row::new(0, terms, b, None).is_none());
+        }
+        impossible
+    }
+
+    /// Left and right sides of its equations.
+    fn equations(&self, space: &Space, mut out: impl FnMut(Vec<Term>, f64)) {
         let at = place(&self.at);
         let mut put = |derivative: [usize; 2], factors: &[(usize, f64)], target: f64| {
             let functional = Functional::new(space, at, derivative);
             let terms = factors.iter().filter(|f| f.1 != 0.0);
             let terms = terms.map(|&(coordinate, factor)| Term { coordinate, functional: functional.clone(), factor });
-            out.extend(Row::new(number, terms.collect(), target, self.weight));
+            out(terms.collect(), target);
         };
         match &self.demand {
             Demand::Position(values) => {
@@ -110,7 +126,7 @@ impl Constraint {
                         Term { coordinate: c, functional: here.clone(), factor: 1.0 },
                         Term { coordinate: c, functional: there.clone(), factor: -factors[c] },
                     ];
-                    out.extend(Row::new(number, terms, offset[c], self.weight));
+                    out(terms, offset[c]);
                 }
             }
         }

@@ -30,8 +30,20 @@ struct Level {
     edges: Edges,
 }
 
-/// Coefficients of the coarsest level that are worth a dense factor.
-const DENSE: usize = 130;
+/// Coefficients at which a level is the coarsest.
+const FEW: usize = 25;
+
+/// Coefficients of the coarsest level for which a dense factor is made.
+pub(crate) const MOST: usize = 1040;
+
+/// The coarsest level of a space: it has few coefficients, or spans that cannot be halved.
+pub(crate) fn coarsest(space: &Space) -> Space {
+    let mut now = space.clone();
+    while let Some(coarser) = now.coarser().filter(|_| now.len() > FEW) {
+        now = coarser;
+    }
+    now
+}
 
 impl Bpx {
     /// `None` where no coarse level is small enough for a dense factor.
@@ -41,7 +53,7 @@ impl Bpx {
         let (mut now, mut map) = (space.clone(), stiffness.cloned());
         let mut operator = h.clone();
         while let Some(coarser) = now.coarser() {
-            if now.len() <= 25 {
+            if now.len() <= FEW {
                 break;
             }
             let mut inverse: Vec<f64> = operator.diagonal().into_iter().map(|d| 1.0 / d).collect();
@@ -54,7 +66,7 @@ impl Bpx {
             operator = Operator::new(&coarser, energy, map.as_ref());
             now = coarser;
         }
-        if now.len() > DENSE.max(if levels.is_empty() { 25 } else { 0 }) * 8 {
+        if now.len() > MOST {
             return None;
         }
         let coarse = dense_factor(&operator, energy)?;

@@ -113,6 +113,15 @@ impl Cholesky {
         Ok(())
     }
 
+    /// Appends a row of the factor: what [`Cholesky::forward`] made of the products with the rows before, and a pivot
+    /// that is known better than by their difference.
+    pub(crate) fn push(&mut self, row: &[f64], pivot: f64) {
+        debug_assert_eq!(row.len(), self.n);
+        self.rows.extend_from_slice(row);
+        self.rows.push(pivot);
+        self.n += 1;
+    }
+
     /// Forgets all rows from `n` on.
     pub(crate) fn truncate(&mut self, n: usize) {
         if n < self.n {

@@ -401,7 +401,11 @@ pub(crate) fn notes(problem: &Problem, redundant: &[Redundant]) -> Vec<String> {
     let name = |c: &usize| problem.constraints()[*c].id.clone();
     let of = |r: &Redundant| {
         let others: Vec<String> = r.others.iter().take(8).map(name).collect();
-        format!("constraint {} follows from {}: redundant", name(&r.constraint), others.join(", "))
+        let (own, others) = (name(&r.constraint), others.join(", "));
+        match r.miss {
+            None => format!("constraint {own} follows from {others}: redundant"),
+            Some(miss) => format!("constraint {own} cannot be told from {others}: left out, missed by {miss:.1e}"),
+        }
     };
     redundant.iter().map(of).collect()
 }

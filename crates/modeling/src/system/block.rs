@@ -147,10 +147,24 @@ impl Structure {
     }
 }
 
+/// Rows of length 1 ask for the same if their targets differ by less than this share of the larger one.
+const SAME: f64 = 1e-9;
+
+/// Targets are rounded to this share of the size of the shape.
+const ROUNDING: f64 = 1e-12;
+
+/// Shapes below this share of the longest side of their domain are zero for all that anyone can tell.
+const NOTHING: f64 = 1e-3;
+
+/// Rows that take part with less than this are not named.
+const NAMED: f64 = 1e-7;
+
 /// Rows that follow from others and were left out.
 pub(crate) struct Redundant {
     pub(crate) constraint: usize,
     pub(crate) others: Vec<usize>,
+    /// How far it is missed, where that is more than rounding: rows too near to others to be told apart.
+    pub(crate) miss: Option<f64>,
 }
 
 impl Problem {
@@ -169,6 +183,7 @@ impl Problem {
     /// [`ProblemError::Conflict`].
     pub(crate) fn blocks(&self, rows: Vec<Row>) -> Result<(Vec<Block>, Vec<Redundant>), ProblemError> {
         let n = self.space.len();
+        let scale = self.scale(&rows);
         // Union of coordinates that share a row.
         let mut group: Vec<usize> = (0..self.coordinates).collect();
         for row in &rows {
@@ -200,11 +215,11 @@ impl Problem {
                     blocks.iter_mut().find(|(first, b)| b.structure.k == 1 && same(first, &rows))
             {
                 let _ = first;
-                let kept: Vec<Row> = self.independent(&rows, n, &mut Vec::new(), &coordinates)?;
+                let kept: Vec<Row> = self.independent(&rows, scale, &mut Vec::new(), &coordinates)?;
                 block.sides.push(side(&kept, coordinates));
                 continue;
             }
-            let kept = self.independent(&rows, n, &mut redundant, &coordinates)?;
+            let kept = self.independent(&rows, scale, &mut redundant, &coordinates)?;
             let of = |c: usize| coordinates.iter().position(|x| *x == c).unwrap_or(0);
             let structure = Structure::new(n, coordinates.len(), &kept, &of);
             let sides = vec![side(&kept, coordinates.clone())];
@@ -213,16 +228,25 @@ impl Problem {
         Ok((blocks.into_iter().map(|b| b.1).collect(), redundant))
     }
 
-    /// The rows without those that follow from others.
+    /// The size of the shape, about: the largest target of any coordinate (rows have length 1, so that all are in units
+    /// of coefficients). Heights of zero beside others come from sums that cancel. A shape of nothing but zeros has
+    /// only its domain to go by.
+    fn scale(&self, rows: &[Row]) -> f64 {
+        let side = |a: &crate::axis::Axis| a.domain()[1] - a.domain()[0];
+        let longest = self.space.axes().iter().map(side).fold(0.0, f64::max);
+        rows.iter().fold(NOTHING * longest, |m: f64, r| m.max(r.target.abs()))
+    }
+
+    /// The rows without those that follow from others; `scale` as [`Problem::scale`] says.
     fn independent(
         &self,
         rows: &[Row],
-        n: usize,
+        scale: f64,
         redundant: &mut Vec<Redundant>,
         coordinates: &[usize],
     ) -> Result<Vec<Row>, ProblemError> {
         let of = |c: usize| coordinates.iter().position(|x| *x == c).unwrap_or(0);
-        let found: Vec<Dependence> = dependent(rows, n, &of);
+        let found: Vec<Dependence> = dependent(rows, self.space.len(), &of);
         if found.is_empty() {
             return Ok(rows.to_vec());
         }
@@ -231,10 +255,12 @@ impl Problem {
             let row = &rows[d.row];
             let size = d.parts.iter().fold(row.target.abs(), |m, (r, c)| m.max((c * rows[*r].target).abs()));
             let miss = row.target - d.parts.iter().map(|(r, c)| c * rows[*r].target).sum::<f64>();
-            let mut others: Vec<usize> = d.parts.iter().map(|(r, _)| rows[*r].constraint).collect();
+            let named = d.parts.iter().filter(|(_, c)| c.abs() > NAMED);
+            let mut others: Vec<usize> = named.map(|(r, _)| rows[*r].constraint).collect();
             others.sort_unstable();
             others.dedup();
-            if miss.abs() > 1e-9 * size {
+            let blurred = d.distance.max(ROUNDING) * scale;
+            if miss.abs() > (SAME * size).max(blurred) {
                 let names: Vec<&str> = others.iter().take(8).map(|c| self.constraints[*c].id.as_str()).collect();
                 return Err(ProblemError::Conflict {
                     id: self.constraints[row.constraint].id.clone(),
@@ -243,7 +269,8 @@ impl Problem {
                 });
             }
             drop[d.row] = true;
-            redundant.push(Redundant { constraint: row.constraint, others });
+            let miss = Some(miss.abs() * row.length).filter(|_| miss.abs() > SAME * size.max(scale));
+            redundant.push(Redundant { constraint: row.constraint, others, miss });
         }
         Ok(rows.iter().zip(drop).filter(|(_, d)| !d).map(|(r, _)| r.clone()).collect())
     }

@@ -1,21 +1,32 @@
 //! Which rows are linear combinations of earlier ones.
 //!
 //! Only rows that share coefficients can depend on each other: the Gram matrix A A^T falls into small pieces, each
-//! factored row by row. A row (of length 1) whose distance from the span of its predecessors is below 1e-6 is
-//! taken as dependent.
+//! factored row by row. A row (of length 1) whose distance from the span of its predecessors is below 3e-7 is taken as
+//! dependent: solvers, which work with squares of distances, could not tell it apart.
 
 use super::block::merged;
 use crate::constraint::Row;
-use crate::solve::cholesky::{Cholesky, start};
+use crate::solve::cholesky::{Cholesky, dot};
 
-/// A row that is the sum of `factor` times other rows.
+/// A row (of length 1) that is the sum of factors times other rows; most factors are nothing but rounding.
 pub(crate) struct Dependence {
     pub(crate) row: usize,
     pub(crate) parts: Vec<(usize, f64)>,
+    /// What the sum leaves, as a length.
+    pub(crate) distance: f64,
 }
 
-/// Squared distance from the span below which a row counts as dependent.
-const SQUARE: f64 = 1e-13;
+/// Distance from the span below which a row counts as dependent.
+const DEPENDENT: f64 = 3e-7;
+
+/// Squared distance above which its rounding errors do not matter.
+const SURE: f64 = 1e-6;
+
+/// Projections of a row at most.
+const CORRECTIONS: usize = 4;
+
+/// Operations beyond which rows are not made orthogonal.
+const OPERATIONS: usize = 1 << 28;
 
 /// Pieces above this many rows are left to the solver.
 const LARGE: usize = 6000;
@@ -59,29 +70,121 @@ fn within(piece: &[usize], rows: &[Row], n: usize, local: &dyn Fn(usize) -> usiz
     let sparse: Vec<Vec<(usize, f64)>> =
         piece.iter().map(|r| merged(rows[*r].entries().map(|(c, i, v)| (local(c) * n + i, v)).collect())).collect();
     let mut kept: Vec<usize> = Vec::new();
-    let mut gram: Vec<f64> = Vec::new();
     let mut factor = Cholesky::default();
-    // The smallest pivot so far: rounding errors grow by its inverse.
-    let mut least = 1.0_f64;
+    let mut orthogonal: Option<Orthogonal> = None;
     for (k, a) in sparse.iter().enumerate() {
-        let products: Vec<f64> = kept.iter().map(|j| sparse_dot(a, &sparse[*j])).collect();
-        let at = start(kept.len());
-        gram.truncate(at);
-        gram.extend_from_slice(&products);
-        gram.push(sparse_dot(a, a));
-        let grown = factor.extend(&gram, kept.len() + 1).is_ok();
-        if grown && factor.pivot(kept.len()).powi(2) > SQUARE.max(4e-15 / least) {
-            least = least.min(factor.pivot(kept.len()));
-            kept.push(k);
-            continue;
+        if orthogonal.is_none() {
+            let mut row: Vec<f64> = kept.iter().map(|j| sparse_dot(a, &sparse[*j])).collect();
+            factor.forward(&mut row);
+            let square = sparse_dot(a, a) - dot(&row, &row);
+            if square > SURE {
+                factor.push(&row, square.sqrt());
+                kept.push(k);
+                continue;
+            }
+            orthogonal = Orthogonal::new(&sparse);
+            if let Some(orthogonal) = &mut orthogonal {
+                factor.truncate(0);
+                for j in &kept {
+                    let (row, rest, distance) = orthogonal.project(&sparse[*j]);
+                    factor.push(&row, distance);
+                    orthogonal.push(rest, distance);
+                }
+            }
         }
-        factor.truncate(kept.len());
-        let mut c = products;
-        factor.forward(&mut c);
-        factor.backward(&mut c);
-        let parts = kept.iter().zip(c).filter(|(_, c)| c.abs() > 1e-7);
-        out.push(Dependence { row: piece[k], parts: parts.map(|(j, c)| (piece[*j], c)).collect() });
+        let (c, distance) = match &mut orthogonal {
+            Some(orthogonal) => {
+                let (mut row, rest, distance) = orthogonal.project(a);
+                if distance > DEPENDENT {
+                    factor.push(&row, distance);
+                    orthogonal.push(rest, distance);
+                } else {
+                    factor.backward(&mut row);
+                }
+                (row, distance)
+            }
+            None => {
+                let (c, distance) = combination(a, &kept, &sparse, &factor);
+                if distance > DEPENDENT {
+                    let mut row: Vec<f64> = kept.iter().map(|j| sparse_dot(a, &sparse[*j])).collect();
+                    factor.forward(&mut row);
+                    factor.push(&row, distance);
+                }
+                (c, distance)
+            }
+        };
+        if distance > DEPENDENT {
+            kept.push(k);
+        } else {
+            let parts = kept.iter().zip(c).map(|(j, c)| (piece[*j], c)).collect();
+            out.push(Dependence { row: piece[k], parts, distance });
+        }
     }
+}
+
+/// Rows made orthogonal to those before them, twice: as exact as the rows are, at the cost of a dense matrix.
+struct Orthogonal {
+    columns: Vec<usize>,
+    rows: Vec<Vec<f64>>,
+}
+
+impl Orthogonal {
+    /// None of the rows yet; `None` where they are too many.
+    fn new(sparse: &[Vec<(usize, f64)>]) -> Option<Orthogonal> {
+        let mut columns: Vec<usize> = sparse.iter().flatten().map(|e| e.0).collect();
+        columns.sort_unstable();
+        columns.dedup();
+        let many = sparse.len().checked_mul(sparse.len())?.checked_mul(columns.len())?;
+        (many <= OPERATIONS).then_some(Orthogonal { columns, rows: Vec::new() })
+    }
+
+    /// Products with the rows so far, the rest, and its length.
+    fn project(&self, a: &[(usize, f64)]) -> (Vec<f64>, Vec<f64>, f64) {
+        let mut rest = vec![0.0; self.columns.len()];
+        for (i, v) in a {
+            if let Ok(at) = self.columns.binary_search(i) {
+                rest[at] = *v;
+            }
+        }
+        let mut products = vec![0.0; self.rows.len()];
+        for _ in 0..2 {
+            for (p, q) in products.iter_mut().zip(&self.rows) {
+                let by = dot(q, &rest);
+                *p += by;
+                rest.iter_mut().zip(q).for_each(|(r, q)| *r -= by * q);
+            }
+        }
+        let distance = dot(&rest, &rest).sqrt();
+        (products, rest, distance)
+    }
+
+    /// One more row: what a projection left, of the length that it had.
+    fn push(&mut self, mut rest: Vec<f64>, length: f64) {
+        rest.iter_mut().for_each(|r| *r /= length);
+        self.rows.push(rest);
+    }
+}
+
+/// The factors with which the kept rows come nearest to `a`, and how near. Products of rows square what these have of
+/// ill condition, so that the rest is computed from the rows themselves and projected again.
+fn combination(a: &[(usize, f64)], kept: &[usize], sparse: &[Vec<(usize, f64)>], factor: &Cholesky) -> (Vec<f64>, f64) {
+    let mut c = vec![0.0; kept.len()];
+    let mut rest = a.to_vec();
+    let mut distance = f64::INFINITY;
+    for _ in 0..CORRECTIONS {
+        let mut d: Vec<f64> = kept.iter().map(|j| sparse_dot(&rest, &sparse[*j])).collect();
+        factor.forward(&mut d);
+        factor.backward(&mut d);
+        let next: Vec<f64> = c.iter().zip(d).map(|(c, d)| c + d).collect();
+        let parts = kept.iter().zip(&next).flat_map(|(j, c)| sparse[*j].iter().map(move |(i, v)| (*i, -c * v)));
+        let left = merged(a.iter().copied().chain(parts).collect());
+        let length = sparse_dot(&left, &left).sqrt();
+        if length >= distance {
+            break;
+        }
+        (c, rest, distance) = (next, left, length);
+    }
+    (c, distance)
 }
 
 /// Scalar product of two sparse vectors, sorted by index.

@@ -79,7 +79,7 @@ pub(crate) struct Gains {
 const CROWDED: f64 = 0.2;
 
 /// Corrections of a side in one solution.
-const CORRECTIONS: usize = 4;
+const CORRECTIONS: usize = 8;
 
 impl Active {
     /// `None` where the axes have no common pyramid; the coarsest B-splines are active.
