@@ -74,14 +74,14 @@ pub(crate) fn along(space: &Space, axis: usize, order: usize) -> [usize; 2] {
 }
 
 impl Constraint {
-    /// Its linear rows with their targets; none for curvature, whose rows depend on the shape, and none where all shapes
-    /// have the same.
+    /// Its linear rows with their targets; none for curvature, whose rows depend on the shape, and none where all
+    /// shapes have the same.
     pub(crate) fn rows(&self, space: &Space, number: usize, out: &mut Vec<Row>) {
         self.equations(space, |terms, target| out.extend(Row::new(number, terms, target, self.weight)));
     }
 
-    /// True if it asks for something else where all shapes have the same: a slope across a mirrored end, or a point that
-    /// is an image of itself.
+    /// True if it asks for something else where all shapes have the same: a slope across a mirrored end, or a point
+    /// that is an image of itself.
     pub(crate) fn is_impossible(&self, space: &Space) -> bool {
         let mut impossible = false;
         if matches!(self.demand, Demand::Derivative(..) | Demand::Image { .. }) {

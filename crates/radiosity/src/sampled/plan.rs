@@ -17,8 +17,8 @@ const SAFETY: f64 = 1.35;
 pub(super) const AIM: f64 = 0.95;
 /// Mean absolute value of a scattered number, over its standard deviation.
 pub(super) const MEAN_OF_SCATTER: f64 = 0.8;
-/// To halve the misfit of direct light takes twice the work along edges, and in smooth parts; to halve the scatter where
-/// rays decide what is seen, four times.
+/// To halve the misfit of direct light takes twice the work along edges, and in smooth parts; to halve the scatter
+/// where rays decide what is seen, four times.
 const MISFIT_POWER: f64 = 1.0;
 const LAMP_POWER: f64 = 2.0;
 /// Work that smaller gathering elements take, as a share of what rays take: their rays count as rays.

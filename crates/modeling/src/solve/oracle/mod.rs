@@ -165,8 +165,8 @@ impl Oracle {
     }
 
     /// True where the oracle is expected to be faster than all wavelets together to a tolerance of 1e-8: surfaces with
-    /// at least 3000 control points a constraint row of a coordinate, 100 where an axis is open; measured from 32 to 512
-    /// spans. Elsewhere it only reduces data. Curves never: their wavelets are few.
+    /// at least 3000 control points a constraint row of a coordinate, 100 where an axis is open; measured from 32 to
+    /// 512 spans. Elsewhere it only reduces data. Curves never: their wavelets are few.
     pub fn pays(problem: &Problem) -> bool {
         let rows = problem.rows().len() as f64 / problem.coordinates() as f64;
         let open = problem.space().axes().iter().any(|a| a.boundary() == Boundary::Open);
