@@ -140,9 +140,7 @@ impl Kept {
 impl Sampled {
     /// The end, with the samples: none if it was stopped where elements are not fitted yet.
     pub(crate) fn into_kept(mut self) -> Solution {
-        let whole =
-            matches!(self.phase, Phase::Finished | Phase::Solving(_) | Phase::Sweeping(_) | Phase::Spreading(_));
-        if !whole {
+        if self.is_growing() {
             return self.into_solution();
         }
         let mut kept = Kept {
@@ -205,7 +203,15 @@ impl Sampled {
         self.begin_again();
     }
 
+    /// Whether there are elements or points about which nothing is known yet.
+    fn is_growing(&self) -> bool {
+        matches!(self.phase, Phase::Fitting { .. } | Phase::Casting { .. })
+    }
+
     fn begin_again(&mut self) {
+        while self.is_growing() {
+            self.step();
+        }
         self.counted_area = counted_area(&self.scene, &self.kernel);
         (self.aim, self.rounds, self.corrections) = (plan::AIM, 0, 0);
         (self.refitted, self.stalled, self.error, self.whole) = (false, false, f64::INFINITY, 0.0);

@@ -71,6 +71,8 @@ enum Phase {
     /// Balancing with the first samples of every element: towards the solution, or the scatter's way through it.
     Solving(Box<Gmres<3>>),
     Spreading(Spread),
+    /// Judged; what comes next is still to be planned.
+    Judged,
     Finished,
 }
 
@@ -223,6 +225,10 @@ impl Sampled {
             Phase::Sweeping(sweep) => Some(self.sweep(sweep)),
             Phase::Solving(gmres) => Some(self.solve(gmres)),
             Phase::Spreading(spread) => Some(self.spread(spread)),
+            Phase::Judged => {
+                self.spend();
+                self.step()
+            }
             Phase::Finished => None,
         }
     }

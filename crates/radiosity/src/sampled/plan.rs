@@ -75,7 +75,7 @@ impl Sampled {
             if self.rounds > PATIENT_ROUNDS {
                 self.aim *= missing.clamp(LOWER[0], LOWER[1]);
             }
-            self.spend();
+            self.phase = Phase::Judged;
         }
         event
     }
