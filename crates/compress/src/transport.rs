@@ -5,6 +5,7 @@
 use crate::forest::{Forest, NodeId};
 use crate::links::{Link, Links};
 use ondelette_numerics::par;
+use ondelette_wavelet::cell::CellBasis;
 
 fn add<const C: usize>(to: &mut [f64; C], k: f64, from: [f64; C]) {
     for c in 0..C {
@@ -26,18 +27,9 @@ pub fn pull<const C: usize>(forest: &Forest, values: &mut [[f64; C]]) {
 
 /// Fills one inner node from its children; leaves are left as they are.
 pub fn pull_node<const C: usize>(forest: &Forest, id: NodeId, values: &mut [[f64; C]]) {
-    if forest.is_leaf(id) {
-        return;
-    }
-    let (n, stride) = (id.index(), forest.stride());
-    let basis = forest.basis_of(id);
-    let len = basis.len();
-    let (head, tail) = values.split_at_mut((n + 1) * stride);
-    let parent = &mut head[n * stride..n * stride + len];
-    parent.fill([0.0; C]);
-    for c in 0..basis.shape().arity() {
-        let at = forest.child(id, c).index() * stride - (n + 1) * stride;
-        basis.pull(c, &tail[at..at + len], parent, add);
+    if let Some((basis, parent, children)) = family(forest, id, values) {
+        parent.fill([0.0; C]);
+        children.enumerate().for_each(|(c, child)| basis.pull(c, child, parent, add));
     }
 }
 
@@ -52,18 +44,27 @@ pub fn push<const C: usize>(forest: &Forest, values: &mut [[f64; C]]) {
 
 /// Adds one inner node's function to its children.
 pub fn push_node<const C: usize>(forest: &Forest, id: NodeId, values: &mut [[f64; C]]) {
+    if let Some((basis, parent, children)) = family(forest, id, values) {
+        children.enumerate().for_each(|(c, child)| basis.push(c, parent, child, add));
+    }
+}
+
+/// The basis of an inner node, its coefficients and those of each child; `None` for a leaf.
+fn family<'a, const C: usize>(
+    forest: &'a Forest,
+    id: NodeId,
+    values: &'a mut [[f64; C]],
+) -> Option<(&'a CellBasis, &'a mut [[f64; C]], impl Iterator<Item = &'a mut [[f64; C]]>)> {
     if forest.is_leaf(id) {
-        return;
+        return None;
     }
-    let (n, stride) = (id.index(), forest.stride());
-    let basis = forest.basis_of(id);
+    let (own, stride, basis) = (id.index(), forest.stride(), forest.basis_of(id));
+    // parents come before their children, and these lie side by side
+    let (head, tail) = values.split_at_mut((own + 1) * stride);
+    let first = (forest.child(id, 0).index() - own - 1) * stride;
+    let children = tail[first..].chunks_mut(stride).take(basis.shape().arity());
     let len = basis.len();
-    let (head, tail) = values.split_at_mut((n + 1) * stride);
-    let parent = &head[n * stride..n * stride + len];
-    for c in 0..basis.shape().arity() {
-        let at = forest.child(id, c).index() * stride - (n + 1) * stride;
-        basis.push(c, parent, &mut tail[at..at + len], add);
-    }
+    Some((basis, &mut head[own * stride..own * stride + len], children.map(move |child| &mut child[..len])))
 }
 
 /// `result` = all links applied to `values`: every node gets what its own links bring. Parallel over receivers.

@@ -9,7 +9,8 @@
 //! solving for the scatter, with signs drawn at random for the elements, a few times over.
 
 use super::field::Field;
-use super::gather::{self, Verdict};
+use super::gather;
+use super::verdict::Verdict;
 use super::{Phase, RAYS_A_STEP, Sampled, positive, stitch};
 use crate::solver::Event;
 use ondelette_numerics::krylov::Gmres;

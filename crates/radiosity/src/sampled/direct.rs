@@ -144,12 +144,12 @@ pub(super) fn open_corners(kernel: &LightKernel, cell: &Cell) -> Vec<[f64; 2]> {
 
 /// Share of an element that is not inside of something, from how many of its points and corners are not: where all
 /// points are alike, a corner that is not is worth a part of a point.
-fn share_of(open: usize, points: usize, open_corners: usize, corners: usize) -> f64 {
+fn share_of(open: usize, points: usize, shape: CellShape, open_corners: impl FnOnce() -> usize) -> f64 {
     let corner = 0.25 / points as f64;
     if open == points {
-        1.0 - corner * (corners - open_corners) as f64
+        1.0 - corner * (corners(shape).len() - open_corners()) as f64
     } else if open == 0 {
-        corner * open_corners as f64
+        corner * open_corners() as f64
     } else {
         open as f64 / points as f64
     }
@@ -201,7 +201,7 @@ pub(super) fn fit(
         let grid = Grid::of(basis, cell.key);
         let points = grid.points.len() as f64;
         let open = grid.points.iter().filter(|x| !is_buried(**x)).count();
-        let lit = share_of(open, grid.points.len(), open_corners(kernel, cell).len(), corners(cell.shape).len());
+        let lit = share_of(open, grid.points.len(), cell.shape, || open_corners(kernel, cell).len());
         let coefficients = vec![0.0; groups * n];
         return Fit { coefficients, misfit: zero.clone(), scatter: zero, lit, work: [points, 0.0], known: None };
     }
@@ -281,10 +281,10 @@ pub(super) fn fit(
     let dark = |q: usize| (0..groups).all(|g| values[g * count + q] == [0.0; 2]) && is_buried(grid.points[q]);
     let lit: Vec<bool> = (0..count).map(|q| !dark(q)).collect();
     let alive = lit.iter().filter(|l| **l).count();
-    let tips = open_corners(kernel, cell);
-    let share = share_of(alive, count, tips.len(), corners(cell.shape).len());
+    let share = share_of(alive, count, cell.shape, || open_corners(kernel, cell).len());
     if alive == 0 {
         // all that sticks out is a corner or two
+        let tips = open_corners(kernel, cell);
         let (cut, found) = (exact(&mut view, &mut tips.iter().copied(), tips.len()), by_rays(&tips, None));
         let values: Vec<f64> = found.iter().zip(&cut).map(|(f, cut)| 0.5 * (f[0] + f[1]) + cut).collect();
         for values in values.chunks(tips.len().max(1)).take(groups) {

@@ -9,6 +9,7 @@
 use super::direct;
 use super::field::Field;
 use super::lamps::on_cell;
+use super::verdict::Verdict;
 use crate::kernel::LightKernel;
 use ondelette_compress::{Forest, NodeId};
 use ondelette_numerics::sobol::Sobol;
@@ -20,9 +21,6 @@ use std::ops::Range;
 pub(super) const MOST: usize = 36;
 /// Points of an element that is not coarse.
 const FINE_POINTS: usize = 16;
-/// Directions that a usual element is as good as, before any is drawn.
-const FIRST_LOOK: f64 = 4.0;
-
 /// One sample of a row: where on a leaf it arrives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Ray {
@@ -421,35 +419,6 @@ pub(super) fn size_of(basis: &CellBasis, coefficients: &[[f64; 3]]) -> f64 {
     }
     let scale = if basis.is_nested() { 1.0 } else { 1.0 / basis.len() as f64 };
     square.iter().map(|s| (s * scale).sqrt()).sum()
-}
-
-/// What the samples of an element say of themselves.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Verdict {
-    /// Root mean square over the element of half the difference of the halves, channels summed: the scatter of their
-    /// mean.
-    pub(super) scatter: f64,
-    /// The same at the points, before the fit.
-    pub(super) noise: f64,
-    /// The same of one direction.
-    pub(super) per_direction: f64,
-    /// Mean product of what both halves' fits leave over at the points: on average the square of what the functions
-    /// cannot say.
-    pub(super) misfit: f64,
-    /// Standard deviation of [`Verdict::misfit`].
-    pub(super) certainty: f64,
-    /// Scatter of the fit over noise at the points, as expected.
-    pub(super) share: f64,
-}
-
-impl Verdict {
-    /// Adds what few samples leave open: as if [`FIRST_LOOK`] directions had had the `usual` square of the noise of
-    /// one.
-    pub(super) fn doubt(&mut self, usual: f64, drawn: f64) {
-        let more = usual * FIRST_LOOK / (drawn.max(1.0) * (drawn + FIRST_LOOK));
-        self.noise = self.noise.hypot(more.sqrt());
-        self.scatter = self.scatter.hypot(self.share * more.sqrt());
-    }
 }
 
 /// A point at random in each of the parts that `levels` splits of a cell make: a mean over them has no bias.

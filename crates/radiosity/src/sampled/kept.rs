@@ -187,10 +187,7 @@ impl Sampled {
 
     /// Paints materials, and begins the balance again.
     pub(crate) fn paint(&mut self, paints: &[Paint]) -> Result<(), PaintError> {
-        let mut scene = (*self.scene).clone();
-        for paint in paints {
-            scene.paint(paint)?;
-        }
+        let scene = self.scene.painted(paints)?;
         self.lamps.repaint(&scene);
         self.scene = Arc::new(scene);
         self.begin_again();

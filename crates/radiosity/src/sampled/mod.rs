@@ -22,6 +22,7 @@ mod positive;
 mod shares;
 mod sphere;
 mod stitch;
+mod verdict;
 
 pub(crate) use exact::ExactDirect;
 pub use kept::Kept;
@@ -34,12 +35,13 @@ use crate::solution::{Solution, Statistics};
 use crate::solver::{Event, SolveError};
 use balance::{Spread, Sweep};
 use direct::Known;
-use gather::{Draw, Gather, Verdict};
+use gather::{Draw, Gather};
 use lamps::Lamps;
 use ondelette_compress::{Forest, Links, NodeId, transport};
 use ondelette_numerics::krylov::Gmres;
 use ondelette_numerics::par;
 use std::sync::Arc;
+use verdict::Verdict;
 
 /// Elements are at first no larger than this share of the scene's surface.
 const FIRST_SHARE: f64 = 1.0 / 256.0;

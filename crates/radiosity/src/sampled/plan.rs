@@ -4,8 +4,9 @@
 //! (half the difference of two independent halves), and what the functions of the gathering elements cannot say (the
 //! product of both halves' misses, which is free of scatter on average).
 
-use super::gather::{Draw, Gather, Verdict};
-use super::shares::{Kind, shares};
+use super::gather::{Draw, Gather};
+use super::shares::{Kind, shares, turning_point};
+use super::verdict::Verdict;
 use super::{Phase, Sampled};
 use crate::solver::Event;
 use ondelette_compress::NodeId;
@@ -240,14 +241,21 @@ impl Sampled {
     /// bring it there, where they do most.
     fn unclear_leaves(&mut self, target: f64) -> Vec<NodeId> {
         // the scatter of one ray, as an integral over the leaf: n rays of a point leave its part 1 / sqrt(n)
-        let mut leaves: Vec<(usize, f64)> = Vec::new();
+        struct Leaf {
+            node: usize,
+            /// Its scatter with one ray, and the power of it that its share of the rays is in proportion to.
+            one: f64,
+            density: f64,
+        }
+        let mut leaves: Vec<Leaf> = Vec::new();
         let mut total = 0.0;
         for (n, node) in self.forest.nodes().iter().enumerate() {
             if node.first_child == 0 && self.counts(node.cell.root) {
                 let scatter = node.measure * f64::from(self.lit[n]) * self.direct_error(n).1;
                 if scatter > 0.0 {
                     total += scatter;
-                    leaves.push((n, scatter * f64::from(self.rays[n]).sqrt()));
+                    let one = scatter * f64::from(self.rays[n]).sqrt();
+                    leaves.push(Leaf { node: n, one, density: one.powf(2.0 / 3.0) });
                 }
             }
         }
@@ -255,20 +263,17 @@ impl Sampled {
             return Vec::new();
         }
         // least rays for a sum of scatter / sqrt(n): n in proportion to scatter^(2/3)
-        let wanted = |factor: f64, n: usize, one: f64| {
-            let now = f64::from(self.rays[n]);
-            (factor * one.powf(2.0 / 3.0)).clamp(now, MOST_LAMP_RAYS.max(now))
+        let wanted = |factor: f64, leaf: &Leaf| {
+            let now = f64::from(self.rays[leaf.node]);
+            (factor * leaf.density).clamp(now, MOST_LAMP_RAYS.max(now))
         };
-        let sum = |factor: f64| leaves.iter().map(|&(n, one)| one / wanted(factor, n, one).sqrt()).sum::<f64>();
-        let (mut low, mut high) = (-700.0, 700.0);
-        for _ in 0..60 {
-            let middle = 0.5 * (low + high);
-            if sum(f64::exp(middle)) > target { low = middle } else { high = middle }
-        }
-        let factor = f64::exp(high);
-        let given: Vec<(usize, f64)> = leaves.iter().map(|&(n, one)| (n, wanted(factor, n, one))).collect();
-        let more: Vec<(usize, f64)> =
-            given.into_iter().filter(|&(n, rays)| rays > ENOUGH_LAMP_RAYS * f64::from(self.rays[n])).collect();
+        let sum = |factor: f64| leaves.iter().map(|leaf| leaf.one / wanted(factor, leaf).sqrt()).sum::<f64>();
+        let [_, factor] = turning_point(|factor| sum(factor) <= target);
+        let more: Vec<(usize, f64)> = leaves
+            .iter()
+            .map(|leaf| (leaf.node, wanted(factor, leaf)))
+            .filter(|&(n, rays)| rays > ENOUGH_LAMP_RAYS * f64::from(self.rays[n]))
+            .collect();
         for &(n, rays) in &more {
             self.rays[n] = rays as f32;
         }
@@ -394,12 +399,7 @@ impl Sampled {
         let scatter = |scale: f64| -> f64 {
             elements.iter().zip(&density).map(|e| ratio * e.0.0 * (wanted(scale, e) / e.0.1).powf(-POWER)).sum()
         };
-        let largest = density.iter().copied().fold(0.0, f64::max);
-        let (mut low, mut high) = (1e-3 / largest, 1e12 / largest);
-        for _ in 0..32 {
-            let middle = (low * high).sqrt();
-            if scatter(middle) > target { low = middle } else { high = middle }
-        }
+        let [_, high] = turning_point(|scale| scatter(scale) <= target);
         let mut draws = Vec::new();
         for (k, (gather, element)) in self.gathers.iter().zip(elements.iter().zip(&density)).enumerate() {
             let each = wanted(high, element).ceil() as u32;

@@ -24,13 +24,18 @@ pub(super) fn shares<const N: usize>(kinds: [Kind; N], total: f64) -> [f64; N] {
     if square(kinds.map(|k| k.error)) <= total * total {
         return kinds.map(|k| k.error);
     }
-    // the factor spans many decades: halved on a logarithmic scale
+    of(turning_point(|factor| square(of(factor)) >= total * total)[0])
+}
+
+/// Where a condition on a positive factor turns from false to true: the largest factor found for which it is false, and
+/// the least for which it is true. Factors span many decades, so the search halves their logarithm.
+pub(super) fn turning_point(is_enough: impl Fn(f64) -> bool) -> [f64; 2] {
     let (mut low, mut high) = (-700.0, 700.0);
-    for _ in 0..60 {
+    for _ in 0..48 {
         let middle = 0.5 * (low + high);
-        if square(of(f64::exp(middle))) < total * total { low = middle } else { high = middle }
+        if is_enough(f64::exp(middle)) { high = middle } else { low = middle }
     }
-    of(f64::exp(low))
+    [low, high].map(f64::exp)
 }
 
 #[cfg(test)]

@@ -48,6 +48,15 @@ pub enum PaintError {
 const LISTED: usize = 12;
 
 impl Scene {
+    /// The scene with materials changed, as by [`Scene::paint`], one after the other.
+    pub(crate) fn painted(&self, paints: &[Paint]) -> Result<Scene, PaintError> {
+        let mut scene = self.clone();
+        for paint in paints {
+            scene.paint(paint)?;
+        }
+        Ok(scene)
+    }
+
     /// Changes every material of the given name. Shapes, sides and their order stay as they are.
     ///
     /// # Errors

@@ -35,11 +35,7 @@ impl Linked {
 
     /// Paints materials, and begins the balance again.
     pub(crate) fn paint(&mut self, paints: &[Paint]) -> Result<(), PaintError> {
-        let mut scene = (*self.scene).clone();
-        for paint in paints {
-            scene.paint(paint)?;
-        }
-        self.scene = Arc::new(scene);
+        self.scene = Arc::new(self.scene.painted(paints)?);
         self.begin_again();
         Ok(())
     }
