@@ -308,7 +308,27 @@ fn auto_solves_surfaces_of_any_number_of_spans() {
     assert_eq!(solved([37, 37], 20, false), Method::Cholesky);
     assert_eq!(solved([13, 64], 20, false), Method::Cholesky);
     assert_eq!(solved([32, 32], 20, true), Method::Cholesky);
-    assert_eq!(solved([32, 32], 150, false), Method::Bpx);
+}
+
+#[test]
+fn auto_gives_way_where_constraints_are_too_crowded_for_a_sparse_factor() {
+    // 500 random values on 4096 spans: some so close that the shape oscillates by 1e4 times their size.
+    let a = Axis::new(Boundary::Open, 4096, [0.0, 1.0]).unwrap();
+    let solved = |places: &dyn Fn(usize) -> f64, method: Method| {
+        let rows = (0..500).map(|i| point(i, &[places(i)], seed::unit(i as u64 + 77))).collect();
+        let problem = Problem::new(Space::curve(a), 1, Energy::BEND, None, rows).unwrap();
+        let solution = solve(&problem, method, 1e-8).unwrap();
+        (solution.converged(), solution.method().0, solution.energy())
+    };
+    let even = |i: usize| (i as f64 + 0.5) / 500.0;
+    let crowded = |i: usize| if i == 0 { 1.5 / 500.0 + 1e-8 } else { even(i) };
+    let (converged, method, energy) = solved(&even, Method::Auto);
+    assert!(converged && method == Method::Cholesky);
+    assert!((energy / solved(&even, Method::Banded).2 - 1.0).abs() < 1e-8);
+    assert!(!solved(&crowded, Method::Cholesky).0, "this problem is too easy to show anything");
+    let (converged, method, energy) = solved(&crowded, Method::Auto);
+    assert!(converged && method == Method::Banded);
+    assert!((energy / solved(&crowded, Method::Banded).2 - 1.0).abs() < 1e-12);
 }
 
 #[test]
@@ -366,6 +386,11 @@ fn bad_input_is_named() {
     assert!(message(point(0, &[f64::NAN], 0.0)).contains("p0"));
     assert!(message(point(0, &[9.0], 0.0)).contains("outside"));
     assert!(message(point(0, &[1.0, 2.0], 0.0)).contains("parameter"));
+    for length in [1e-300, 1e300] {
+        let space = Space::curve(Axis::new(Boundary::Open, 8, [0.0, length]).unwrap());
+        let refused = Problem::new(space, 1, Energy::BEND, None, vec![point(0, &[0.0], 0.0)]);
+        assert!(refused.is_err_and(|e| e.to_string().contains("length")));
+    }
     assert!(message(point(0, &[1.0], f64::INFINITY)).contains("inf"));
     assert!(message(point(0, &[1.0], 0.0).soft(0.0)).contains("weight"));
     assert!(message(Constraint::new("n", &[1.0], Demand::Normal(vec![1.0]))).contains("coordinate"));

@@ -67,6 +67,9 @@ pub(crate) fn run(plan: &DesignPlan) -> Result<Outcome, Refusal> {
     if !solution.converged() && !stopped && solution.iterations() == 0 && !solution.notes().is_empty() {
         return Err(named(&solution.notes().join("; ")));
     }
+    if !solution.energy().is_finite() {
+        return Err(named(&"the shape has no finite energy: use smaller numbers, or a longer domain"));
+    }
     document.geometry = geometry(&document.axes, &solution).map_err(|e| named(&e))?;
     let out = Outgoing {
         document: &document,

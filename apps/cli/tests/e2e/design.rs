@@ -63,7 +63,8 @@ fn an_adaptive_surface_says_how_few_wavelets_hold_it() {
     // So small a surface is solved sooner with all wavelets, and the program says so; a large one is not.
     assert_eq!((&few["adaptive"]["faster_than_full"], &all["adaptive"]), (&json!(false), &Value::Null));
     assert!(ended.err.contains("not expected to be faster"), "{}", ended.err);
-    place.write("large.json", spec.replace("ADAPTIVE", "\"adaptive\": true,").replace("5,", "8,"));
+    place
+        .write("large.json", spec.replace("ADAPTIVE", "\"adaptive\": true,").replace("\"levels\": 5", "\"levels\": 8"));
     let ended = place.run("surface large.json -o large.npy --report large-r.json").with_code(0);
     assert_eq!(document(&place, "large-r.json")["adaptive"]["faster_than_full"], json!(true));
     assert!(!ended.err.contains("not expected"), "{}", ended.err);

@@ -319,7 +319,9 @@ impl Document {
                 return Err(format!("the document is of a {}, not of a {}", kind(a), kind(b)));
             }
             (Some(n), _) | (None, Some(n)) => n,
-            (None, None) => return Err("the document does not say its kind: curve or surface".to_owned()),
+            (None, None) => {
+                return Err("the document does not say its kind: add \"kind\": \"curve\" or \"surface\"".to_owned());
+            }
         };
         let mut out = Document::new(raw.axes(axes)?);
         out.settings(&raw)?;

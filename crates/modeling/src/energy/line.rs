@@ -24,9 +24,22 @@ pub(crate) struct Line {
     pub(crate) energy: [Stencil; 4],
 }
 
+/// Spans of which all are looked at; a longer line has only more rows like those in the middle.
+const SHORT: usize = 64;
+
 impl Line {
+    /// The line of an axis. Cost O(1) in its spans.
     pub(crate) fn new(axis: &Axis) -> Line {
-        let (boundary, spans, n) = (axis.boundary(), axis.spans(), axis.len());
+        let spans = axis.spans().min(SHORT);
+        let more = axis.spans() - spans;
+        let mut line = Line::short(axis.boundary(), spans, axis.len() - more);
+        for all in [&mut line.differences, &mut line.transposed, &mut line.gram, &mut line.energy] {
+            all.iter_mut().for_each(|stencil| stencil.lengthen(more));
+        }
+        Line { spans: axis.spans(), n: axis.len(), ..line }
+    }
+
+    fn short(boundary: Boundary, spans: usize, n: usize) -> Line {
         let differences: [Stencil; 4] = std::array::from_fn(|a| difference(boundary, spans, n, a));
         let gram: [Stencil; 4] = std::array::from_fn(|a| gram(boundary, spans, a, None));
         let transposed: [Stencil; 4] = std::array::from_fn(|a| differences[a].transposed());
@@ -187,6 +200,27 @@ mod tests {
                     }
                     for (k, (g, w)) in got.iter().zip(&want).enumerate() {
                         assert!((g - w).abs() < 1e-13, "{boundary:?} {spans} a {a} entry {k}: {g} {w}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_long_line_is_a_short_one_with_more_in_the_middle() {
+        for boundary in [Boundary::Open, Boundary::Mirrored, Boundary::Periodic] {
+            for spans in [SHORT - 1, SHORT, SHORT + 1, 3 * SHORT + 5] {
+                let axis = Axis::new(boundary, spans, [0.0, 1.0]).unwrap();
+                let (line, whole) = (Line::new(&axis), Line::short(boundary, spans, axis.len()));
+                assert_eq!((line.spans, line.n), (whole.spans, whole.n));
+                for (a, b) in [
+                    (&line.differences, &whole.differences),
+                    (&line.transposed, &whole.transposed),
+                    (&line.gram, &whole.gram),
+                    (&line.energy, &whole.energy),
+                ] {
+                    for (a, b) in a.iter().zip(b) {
+                        assert_eq!((a.rows, a.cols, a.to_rows()), (b.rows, b.cols, b.to_rows()), "{boundary:?} {spans}");
                     }
                 }
             }

@@ -40,6 +40,18 @@ impl Stencil {
         Stencil { rows: n, cols, lo, hi, first, taps, edges }
     }
 
+    /// Puts more rows and columns into the middle, all like the middle row, which the interior must hold.
+    pub(crate) fn lengthen(&mut self, more: usize) {
+        let (rows, cols) = (self.rows / 2, self.cols / 2);
+        for (r, row) in &mut self.edges {
+            *r += if *r > rows { more } else { 0 };
+            row.iter_mut().for_each(|(c, _)| *c += if *c > cols { more } else { 0 });
+        }
+        self.rows += more;
+        self.cols += more;
+        self.hi += more;
+    }
+
     /// Its rows as lists of entries.
     pub(crate) fn to_rows(&self) -> Vec<Vec<(usize, f64)>> {
         let mut rows = vec![Vec::new(); self.rows];

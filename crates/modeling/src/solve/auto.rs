@@ -16,8 +16,8 @@ const SMALL: usize = 10_000;
 /// Coefficients with varying stiffness up to which a sparse factor is faster than conjugate gradients.
 const STIFF: usize = 4500;
 
-/// Coefficients a row up to which constraints may be too crowded for a sparse factor to converge.
-const CROWDED: usize = 9;
+/// Rows of a curve from which on their dense products cost more than a sparse factor.
+const MANY: usize = 150;
 
 /// Unknowns that a sparse factor is made for unasked.
 const LARGE: usize = 400_000;
@@ -28,6 +28,9 @@ pub(crate) fn choose(problem: &Problem, h: &Operator, asked: Method) -> Result<(
     let waves = h.is_uniform() && axes.iter().all(|a| a.boundary() != Boundary::Open);
     let unfit = |why| Err(SolveError::Method { method: asked, why });
     match asked {
+        Method::Auto if problem.space().is_curve() && rows(problem) > MANY => {
+            Ok((Method::Cholesky, "a curve with many constraints"))
+        }
         Method::Auto if problem.space().is_curve() => Ok((Method::Banded, "a curve")),
         Method::Auto if waves => Ok((Method::Spectral, "mirrored or periodic axes of uniform stiffness")),
         Method::Auto => sparse_or_levels(problem, h),
@@ -37,10 +40,26 @@ pub(crate) fn choose(problem: &Problem, h: &Operator, asked: Method) -> Result<(
     }
 }
 
+/// Rows of a coordinate, about.
+fn rows(problem: &Problem) -> usize {
+    problem.rows().len() / problem.coordinates()
+}
+
+/// What a sparse factor gives way to where crowded constraints are too much for it.
+pub(crate) fn spare(problem: &Problem, chosen: Method) -> Option<(Method, &'static str)> {
+    let space = problem.space();
+    match chosen {
+        Method::Cholesky if space.is_curve() => Some((Method::Banded, "a curve with crowded constraints")),
+        Method::Cholesky if bpx::coarsest(space).len() <= bpx::MOST => {
+            Some((Method::Bpx, "constraints too crowded for a sparse factor"))
+        }
+        _ => None,
+    }
+}
+
 /// For surfaces on open axes or of varying stiffness; measured by `cargo bench --bench auto`.
 fn sparse_or_levels(problem: &Problem, h: &Operator) -> Result<(Method, &'static str), SolveError> {
     let n = problem.space().len();
-    let rows = problem.rows().len() / problem.coordinates();
     let coarsest = bpx::coarsest(problem.space()).len();
     if coarsest > bpx::MOST {
         if n * problem.coordinates() > LARGE {
@@ -52,7 +71,7 @@ fn sparse_or_levels(problem: &Problem, h: &Operator) -> Result<(Method, &'static
     if coarsest > COARSE && n <= SMALL {
         return Ok((Method::Cholesky, "spans that do not halve often"));
     }
-    if !h.is_uniform() && n <= STIFF && rows * CROWDED < n {
+    if !h.is_uniform() && n <= STIFF {
         return Ok((Method::Cholesky, "varying stiffness on few spans"));
     }
     Ok((Method::Bpx, "open axes or varying stiffness"))

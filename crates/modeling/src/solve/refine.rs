@@ -1,6 +1,6 @@
 //! The stepped solver: blocks one after another, each refined until it no longer moves.
 
-use super::auto::choose;
+use super::auto::{choose, spare};
 use super::banded::{BandGreen, Banded};
 use super::bpx::Bpx;
 use super::correct::Correct;
@@ -80,6 +80,8 @@ pub struct Solver {
     pub(super) settings: Settings,
     pub(super) method: Method,
     why: &'static str,
+    /// What a choice by rule gives way to if it does not converge.
+    spare: Option<(Method, &'static str)>,
     h: Arc<Operator>,
     pub(super) blocks: Vec<(Arc<Structure>, Block)>,
     notes: Vec<String>,
@@ -127,6 +129,7 @@ impl Solver {
         let (blocks, redundant) = problem.blocks(rows)?;
         let h = Arc::new(Operator::new(problem.space(), problem.energy(), problem.stiffness()));
         let (method, why) = choose(&problem, &h, settings.method)?;
+        let spare = if settings.method == Method::Auto { spare(&problem, method) } else { None };
         let notes = notes(&problem, &redundant);
         let sides = fresh_sides(&blocks);
         let blocks: Vec<(Arc<Structure>, Block)> =
@@ -136,6 +139,7 @@ impl Solver {
             settings,
             method,
             why,
+            spare,
             h,
             correctors: (0..blocks.len()).map(|_| None).collect(),
             blocks,
@@ -207,7 +211,11 @@ impl Solver {
             return self.advance();
         }
         if self.correctors[b].is_none() {
-            self.correctors[b] = Some(self.corrector_of(b)?);
+            match self.corrector_of(b) {
+                Ok(corrector) => self.correctors[b] = Some(corrector),
+                Err(_) if self.give_way() => return self.advance(),
+                Err(e) => return Err(e),
+            }
         }
         let Some(corrector) = self.correctors[b].as_mut() else { return Ok(None) };
         if self.stage == Stage::Residual {
@@ -261,8 +269,12 @@ impl Solver {
         let last = side.corrections >= most || !finite || stop;
         let settled = change <= 100.0 * self.settings.tolerance && stalled;
         if (last || stalled) && !enough && change > self.settings.tolerance && !settled {
+            if !stop && self.give_way() {
+                return;
+            }
             self.converged = false;
         }
+        let side = &mut self.sides[b][s];
         side.change = change;
         side.miss = miss;
         self.stage = Stage::Residual;
@@ -276,6 +288,21 @@ impl Solver {
         if stop {
             self.stage = Stage::Finished;
         }
+    }
+
+    /// Starts anew with the spare method, if there is one.
+    fn give_way(&mut self) -> bool {
+        let Some((method, why)) = self.spare.take() else { return false };
+        (self.method, self.why) = (method, why);
+        for side in self.sides.iter_mut().flatten() {
+            side.x.fill(0.0);
+            side.multipliers.fill(0.0);
+            (side.corrections, side.change, side.miss) = (0, f64::INFINITY, f64::INFINITY);
+        }
+        self.correctors.iter_mut().for_each(|c| *c = None);
+        self.at = (0, 0);
+        self.stage = Stage::Residual;
+        true
     }
 
     /// Newton's step for curvature constraints: rows linear around the shape so far. False when they are met.

@@ -59,6 +59,9 @@ pub enum ProblemError {
         /// By how much.
         miss: f64,
     },
+    /// Powers of spans this long or short are no numbers.
+    #[error("a domain of length {0:e}: energies can be computed for lengths from 1e-25 to 1e25")]
+    Domain(f64),
     /// More memory than the limit.
     #[error("{what} would take {bytes} bytes, the limit is {limit}: use fewer spans or constraints")]
     Memory {
@@ -91,6 +94,10 @@ impl Problem {
             return Err(ProblemError::Coordinates(coordinates));
         }
         let energy = Energy::new(energy.stretch, energy.bend, energy.variation)?;
+        let mut sides = space.axes().iter().map(|a| a.domain()[1] - a.domain()[0]);
+        if let Some(side) = sides.find(|side| !(1e-25..=1e25).contains(side)) {
+            return Err(ProblemError::Domain(side));
+        }
         // Two dozen vectors of all coefficients is what the leanest solver needs.
         let lengths: Vec<u64> = space.axes().iter().map(|a| a.spans() as u64 + 3).collect();
         let all = lengths.iter().try_fold(24 * 8 * coordinates as u64, |a, n| a.checked_mul(*n)).unwrap_or(u64::MAX);

@@ -42,6 +42,9 @@ const POINT: [f32; 3] = [0.90, 0.45, 0.05];
 const DIRECTION: [f32; 3] = [0.05, 0.52, 0.38];
 const QUILL: [f32; 3] = [0.68, 0.25, 0.55];
 
+/// Angle that a curve may turn between quills of its comb.
+const TURN: f64 = 0.05;
+
 /// Draws curves: flat ones from above, others from a corner.
 pub fn curve(curves: &[&dyn ParametricCurve], with: &CurvePicture) -> Picture {
     let mut canvas = Canvas::new(with.size[0], with.size[1], PAPER);
@@ -139,7 +142,20 @@ fn combs(curves: &[&dyn ParametricCurve], fine: &[Vec<(f64, [f64; 3])>]) -> Vec<
         .map(|(curve, points)| {
             let step = (points.len() / 480).max(1);
             let ends = points.len().saturating_sub(1);
-            let chosen = points.iter().enumerate().filter(|(i, _)| i % step == 0 || *i == ends);
+            // Evenly, and wherever the curve has turned by a few degrees: noses would look like polygons.
+            let mut last = [0.0; 3];
+            let chosen = points.iter().enumerate().filter(|&(i, (_, p))| {
+                let near = points[(i + 1).min(ends)].1;
+                let chord: [f64; 3] = std::array::from_fn(|c| near[c] - p[c]);
+                let length = chord.iter().map(|x| x * x).sum::<f64>().sqrt();
+                let chord = chord.map(|x| if length > 0.0 { x / length } else { 0.0 });
+                let turned = chord.iter().zip(&last).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt() > TURN;
+                let take = i % step == 0 || i == ends || turned;
+                if take {
+                    last = chord;
+                }
+                take
+            });
             chosen.filter_map(|(_, (t, p))| curve.jet(*t).curvature_vector().map(|k| (*p, k))).collect()
         })
         .collect();
