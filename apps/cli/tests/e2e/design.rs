@@ -213,6 +213,12 @@ fn specifications_that_make_no_sense_are_refused_by_name() {
         ),
         ("curve", constraints(r#"{ "id": "q", "curve": { "at": [[0, 0], [1, 1]], "position": [[1], [2]] } }"#), "q"),
         ("curve", constraints(r#"{ "id": "q", "position": [1, 2] }"#), "at is missing"),
+        ("curve", constraints(a).replace("{ \"levels\"", "{ \"domain\": [0, 1e-300], \"levels\""), "length"),
+        (
+            "curve",
+            constraints(&format!(r#"{a}, {{ "id": "k", "at": 0.2, "position": [0, 0], "curvature": 1e300 }}"#)),
+            "finite energy",
+        ),
         ("surface", constraints(a), "a"),
         ("surface", r#"{ "kind": "curve", "levels": 3 }"#.to_owned(), "surface"),
     ] {

@@ -220,7 +220,8 @@ mod tests {
                     (&line.energy, &whole.energy),
                 ] {
                     for (a, b) in a.iter().zip(b) {
-                        assert_eq!((a.rows, a.cols, a.to_rows()), (b.rows, b.cols, b.to_rows()), "{boundary:?} {spans}");
+                        let whole = (b.rows, b.cols, b.to_rows());
+                        assert_eq!((a.rows, a.cols, a.to_rows()), whole, "{boundary:?} {spans}");
                     }
                 }
             }

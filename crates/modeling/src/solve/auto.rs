@@ -17,7 +17,7 @@ const SMALL: usize = 10_000;
 const STIFF: usize = 4500;
 
 /// Rows of a curve from which on their dense products cost more than a sparse factor.
-const MANY: usize = 150;
+const MANY: usize = 64;
 
 /// Unknowns that a sparse factor is made for unasked.
 const LARGE: usize = 400_000;
