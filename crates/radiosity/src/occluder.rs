@@ -260,14 +260,14 @@ impl Occluders {
         found
     }
 
-    /// All patches that may reach into the shaft, without the two given ones.
-    pub fn candidates(&self, shaft: &Shaft, except: [u32; 2]) -> Vec<u32> {
+    /// Patches that may reach into the shaft, without the two given ones: all of them, or more than `most`.
+    pub fn candidates(&self, shaft: &Shaft, except: [u32; 2], most: usize) -> Vec<u32> {
         let mut found = Vec::new();
         if self.binary.nodes.is_empty() {
             return found;
         }
         let mut stack = vec![0u32];
-        while let Some(n) = stack.pop() {
+        while let Some(n) = stack.pop().filter(|_| found.len() <= most) {
             let node = &self.binary.nodes[n as usize];
             let (low, high) = self.world(&node.aabb);
             if shaft.misses_box(low, high) {
@@ -288,12 +288,18 @@ impl Occluders {
         found
     }
 
-    /// Whether one patch alone hides one convex polygon from another: it crosses every segment between their corners.
-    pub fn hides(&self, patch: u32, from: &[DVec3], to: &[DVec3]) -> bool {
-        let facet = &self.facets[patch as usize];
-        from.iter().all(|&a| {
-            to.iter()
-                .all(|&b| facet.crossing(a, b - a).is_some_and(|t| t > RELATIVE_EPSILON && t < 1.0 - RELATIVE_EPSILON))
+    /// Whether one patch, not among the given ones, hides one convex polygon from another all by itself: it crosses
+    /// every segment between their corners. Then it crosses that between their middles, so that one ray finds it.
+    pub fn hides(&self, from: &[DVec3], to: &[DVec3], except: [u32; 2]) -> bool {
+        let middle = |polygon: &[DVec3]| polygon.iter().sum::<DVec3>() / polygon.len() as f64;
+        let within = |t: f64| t > RELATIVE_EPSILON && t < 1.0 - RELATIVE_EPSILON;
+        let a = middle(from);
+        !self.wide.ray_traverse_miss(self.ray(a, middle(to) - a, 1.001), |_, id| {
+            let patch = self.wide.primitive_indices[id];
+            let facet = &self.facets[patch as usize];
+            let crosses = |a: DVec3, b: DVec3| facet.crossing(a, b - a).is_some_and(within);
+            let hides = || from.iter().all(|&a| to.iter().all(|&b| crosses(a, b)));
+            if !except.contains(&patch) && hides() { 0.5 } else { f32::INFINITY }
         })
     }
 }

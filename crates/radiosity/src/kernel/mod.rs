@@ -229,13 +229,13 @@ impl Kernel for LightKernel {
         }
         let patches = [self.sides[receiver.root as usize].patch, self.sides[shooter.root as usize].patch];
         let (a, b) = (r.polygon(), s.polygon());
-        let shaft = Shaft::between(a.corners(), r.normal, b.corners(), s.normal, tolerance);
-        let candidates = self.occluders.candidates(&shaft, patches);
-        if candidates.iter().any(|&p| self.occluders.hides(p, a.corners(), b.corners())) {
+        if self.occluders.hides(a.corners(), b.corners(), patches) {
             return None;
         }
+        let shaft = Shaft::between(a.corners(), r.normal, b.corners(), s.normal, tolerance);
+        let is_free = self.occluders.candidates(&shaft, patches, 0).is_empty();
         let covered = |cell: &Cell| !self.covers[cell.root as usize].is_empty();
-        let masked = !candidates.is_empty() || covered(receiver) || covered(shooter);
+        let masked = !is_free || covered(receiver) || covered(shooter);
         let node = self.present.as_ref().and_then(|p| p.inner_node(shooter));
         let sides = [receiver.root as usize, shooter.root as usize];
         Some(LightPair { kernel: self, receiver: r, shooter: s, sides, cell: *shooter, node, patches, masked })

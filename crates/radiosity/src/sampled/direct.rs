@@ -162,6 +162,9 @@ const SIGNIFICANT: f64 = 1.0;
 /// by about this factor (against independent paths in furnished rooms).
 const DOUBT: f64 = 1.3;
 
+/// Share of a dark element that a lit corner speaks for: half of what lies between the outer points and the rim.
+const BESIDE: f64 = 1.0 / 16.0;
+
 /// What a fit found out on an element, for fits with more rays to go on from.
 #[derive(Clone, Debug)]
 pub(super) struct Known {
@@ -293,6 +296,15 @@ pub(super) fn fit(
         }
         coefficients.resize(groups * n, 0.0);
         return Fit { coefficients, misfit: zero.clone(), scatter: zero, lit: share, work, known: None };
+    }
+    if values.iter().all(|v| *v == [0.0; 2]) {
+        // in shadow, but for what may stick out of it between the points and the rim
+        let rim = corners(cell.shape);
+        let (cut, found) = (exact(&mut view, &mut rim.iter().copied(), rim.len()), by_rays(rim, None));
+        let rim_values = |g: usize| (0..rim.len()).map(move |q| g * rim.len() + q);
+        let beside = |g: usize| rim_values(g).map(|k| 0.5 * (found[k][0] + found[k][1]) + cut[k]).sum::<f64>();
+        let misfit = (0..groups).map(|g| (BESIDE * beside(g)) as f32).collect();
+        return Fit { coefficients: vec![0.0; groups * n], misfit, scatter: zero, lit: share, work, known };
     }
     let part = if alive == count { None } else { Some(grid.part(&lit, n)) };
     let matrix = part.as_ref().unwrap_or(&grid.matrix);

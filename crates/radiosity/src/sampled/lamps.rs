@@ -215,11 +215,11 @@ impl Lamps {
                 continue;
             }
             let (a, b) = (polygon.corners(), lamp.polygon.corners());
-            let shaft = Shaft::between(a, n, b, lamp.element.normal(), tolerance);
-            let patches = kernel.occluders().candidates(&shaft, [own, lamp.patch]);
-            if patches.iter().any(|&p| kernel.occluders().hides(p, a, b)) {
+            if kernel.occluders().hides(a, b, [own, lamp.patch]) {
                 continue;
             }
+            let shaft = Shaft::between(a, n, b, lamp.element.normal(), tolerance);
+            let patches = kernel.occluders().candidates(&shaft, [own, lamp.patch], MOST_BLOCKERS);
             if patches.len() > MOST_BLOCKERS {
                 seen.crowded.push((k as u32, share as f32));
             } else {
