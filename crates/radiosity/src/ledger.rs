@@ -71,7 +71,11 @@ impl Ledger {
         let mut leaves = Vec::new();
         let mut whole = 0.0;
         solution.each_leaf(|leaf, side, area, mean| {
-            let mean = if solution.lit()[leaf] < 1.0 { lit_mean(solution, &kernel, leaf, side) } else { mean };
+            let mean = match solution.lit()[leaf] {
+                lit if lit >= 1.0 => mean,
+                lit if lit > 0.0 => lit_mean(solution, &kernel, leaf, side),
+                _ => Rgb::BLACK,
+            };
             let material = scene.material(scene.sides[side]);
             let exitance = material.radiance * std::f64::consts::PI;
             ledger.emitted += exitance * area;

@@ -8,7 +8,7 @@
 //! after reflection. Where much is reflected, this common part is larger than the scatter itself. It is found by
 //! solving for the scatter, with signs drawn at random for the elements, a few times over.
 
-use super::field::Field;
+use super::field::{self, Field, Form};
 use super::gather;
 use super::verdict::Verdict;
 use super::{Phase, RAYS_A_STEP, Sampled, positive, stitch};
@@ -37,6 +37,7 @@ const AMPLIFIED: f64 = 3.0;
 pub(super) struct Sweep {
     /// What every leaf sends on.
     radiosity: Vec<[f64; 3]>,
+    forms: Vec<Form>,
     /// What is gathered, and half the difference of the halves, `[gather][function]`.
     gathered: Vec<[f64; 3]>,
     apart: Vec<[f64; 3]>,
@@ -67,7 +68,8 @@ impl Sampled {
         }
         self.reflect(&mut radiosity, true);
         let empty = vec![[0.0; 3]; self.indirect.len()];
-        self.phase = Phase::Sweeping(Sweep { radiosity, gathered: empty.clone(), apart: empty, done: 0 });
+        let forms = field::bilinear(&self.forest, &radiosity);
+        self.phase = Phase::Sweeping(Sweep { radiosity, forms, gathered: empty.clone(), apart: empty, done: 0 });
     }
 
     pub(super) fn sweep(&mut self, mut sweep: Sweep) -> Event {
@@ -78,7 +80,7 @@ impl Sampled {
             reads += self.gathers[sweep.done + count].samples();
             count += 1;
         }
-        let field = Field::new(&self.forest, &sweep.radiosity);
+        let field = Field::new(&self.forest, &sweep.radiosity, &sweep.forms);
         let gathers = &self.gathers[sweep.done..sweep.done + count];
         let judged = par::map(count, |k| {
             let (mut out, mut apart) = (vec![[0.0; 3]; stride], vec![[0.0; 3]; stride]);
@@ -106,10 +108,8 @@ impl Sampled {
 
     /// Solves for what a sweep left over, or goes on if that is little.
     fn correct(&mut self, sweep: Sweep) {
-        let mut residual = sweep.gathered.clone();
-        for (r, i) in residual.iter_mut().zip(&self.indirect) {
-            (0..3).for_each(|c| r[c] -= i[c]);
-        }
+        let pairs = sweep.gathered.iter().zip(&self.indirect);
+        let residual = pairs.map(|(g, i)| std::array::from_fn(|c| g[c] - i[c])).collect();
         let gmres = Gmres::new(self.indirect.clone(), residual, self.weights());
         let left = self.relative(&gmres);
         self.statistics.residual = left;
@@ -154,7 +154,8 @@ impl Sampled {
         let mut values = vec![[0.0; 3]; self.forest.len() * self.forest.stride()];
         self.add_indirect(x, &mut values);
         self.reflect(&mut values, false);
-        let field = Field::new(&self.forest, &values);
+        let forms = field::bilinear(&self.forest, &values);
+        let field = Field::new(&self.forest, &values, &forms);
         let stride = self.forest.stride();
         let mut out = vec![[0.0; 3]; self.gathers.len() * stride];
         par::for_each_chunk(&mut out, 16 * stride, |chunk, slots| {

@@ -168,18 +168,39 @@ const BESIDE: f64 = 1.0 / 16.0;
 /// What a fit found out on an element, for fits with more rays to go on from.
 #[derive(Clone, Debug)]
 pub(super) struct Known {
-    /// What is cut out exactly, at the points of the grid, `[group][point]`.
-    exact: Box<[f64]>,
-    /// What is left to rays, how many of a point there were, and what they found: of both halves, likewise.
+    /// The groups of which it found anything; the others bring nothing.
+    groups: Box<[u8]>,
+    /// What is cut out exactly, at the points of the grid, and what rays found, of both halves: `[group][point]`.
+    found: Box<[[f32; 3]]>,
+    /// What is left to rays, and how many of a point there were.
     crowded: Box<[Crowded]>,
     rays: f64,
-    found: Box<[[f64; 2]]>,
 }
 
 impl Known {
+    fn of(cut: &[f64], found: &[[f64; 2]], points: usize, crowded: &[Crowded], rays: f64) -> Self {
+        let both = |k: usize| [cut[k] as f32, found[k][0] as f32, found[k][1] as f32];
+        let own = |g: usize| (g * points..(g + 1) * points).map(both);
+        let groups: Box<[u8]> =
+            (0..cut.len() / points).filter(|g| own(*g).any(|v| v != [0.0; 3])).map(|g| g as u8).collect();
+        let found = groups.iter().flat_map(|g| own(usize::from(*g))).collect();
+        Known { groups, found, crowded: crowded.into(), rays }
+    }
+
+    /// What was cut out and found, of so many groups and points.
+    fn values(&self, groups: usize, points: usize) -> (Vec<f64>, Vec<[f64; 2]>) {
+        let (mut cut, mut found) = (vec![0.0; groups * points], vec![[0.0; 2]; groups * points]);
+        for (g, own) in self.groups.iter().zip(self.found.chunks(points)) {
+            for (k, [c, a, b]) in (usize::from(*g) * points..).zip(own) {
+                (cut[k], found[k]) = (f64::from(*c), [f64::from(*a), f64::from(*b)]);
+            }
+        }
+        (cut, found)
+    }
+
     /// Counted bytes.
     pub(super) fn bytes(&self) -> usize {
-        size_of_val(&*self.exact) + size_of_val(&*self.crowded) + size_of_val(&*self.found)
+        size_of_val(&*self.groups) + size_of_val(&*self.found) + size_of_val(&*self.crowded)
     }
 }
 
@@ -224,9 +245,8 @@ pub(super) fn fit(
         values
     };
     // what rays find there, of both halves; those that were drawn count, too
-    let by_rays = |points: &[[f64; 2]], before: Option<&Known>| {
-        let mut values = before.map_or_else(|| vec![[0.0; 2]; groups * points.len()], |k| k.found.to_vec());
-        let drawn = before.map_or(0.0, |k| k.rays);
+    let by_rays = |points: &[[f64; 2]], before: Option<(f64, Vec<[f64; 2]>)>| {
+        let (drawn, mut values) = before.unwrap_or_else(|| (0.0, vec![[0.0; 2]; groups * points.len()]));
         let fresh = (rays - drawn).max(0.0);
         if fresh == 0.0 {
             return values;
@@ -272,14 +292,16 @@ pub(super) fn fit(
     }
     let grid = Grid::of(basis, cell.key);
     let count = grid.points.len();
-    let cut = known.map_or_else(|| exact(&mut view, &mut grid.points.iter().copied(), count), |k| k.exact.to_vec());
-    let found = by_rays(&grid.points, known);
+    let (cut, before) = match known.map(|k| (k.rays, k.values(groups, count))) {
+        Some((rays, (cut, found))) => (cut, Some((rays, found))),
+        None => (exact(&mut view, &mut grid.points.iter().copied(), count), None),
+    };
+    let found = by_rays(&grid.points, before);
     let values: Vec<[f64; 2]> = found.iter().zip(&cut).map(|(found, cut)| found.map(|f| f + cut)).collect();
     let fresh = rays - known.map_or(0.0, |k| k.rays);
     let work = [seen.work(), crowded.iter().map(|c| fresh * f64::from(c.1)).sum()].map(|w: f64| w * count as f64);
     let doubt = if seen.is_crowded() || !crowded.is_empty() { DOUBT } else { 1.0 };
-    let known =
-        (!crowded.is_empty()).then(|| Known { exact: cut.into(), crowded: crowded.into(), rays, found: found.into() });
+    let known = (!crowded.is_empty()).then(|| Known::of(&cut, &found, count, crowded, rays));
     // where no lamp shines it may be dark inside of something
     let dark = |q: usize| (0..groups).all(|g| values[g * count + q] == [0.0; 2]) && is_buried(grid.points[q]);
     let lit: Vec<bool> = (0..count).map(|q| !dark(q)).collect();

@@ -1,48 +1,58 @@
 //! The light that rays read.
 
 use super::gather::{MOST, Ray};
+use ondelette_compress::forest::Node;
 use ondelette_compress::{Forest, NodeId};
 use ondelette_wavelet::cell::CellShape;
 
-/// A radiosity at the leaves, in the form in which rays read it fastest.
+/// A radiosity at the leaves.
 pub(super) struct Field<'a> {
     pub(super) forest: &'a Forest,
     coefficients: &'a [[f64; 3]],
-    /// For bases up to the second order: `a + b s + c t + d s t` on each leaf.
-    bilinear: Vec<[[f64; 3]; 4]>,
+    /// See [`bilinear`].
+    bilinear: &'a [Form],
 }
 
-impl<'a> Field<'a> {
-    /// Prepares coefficients at the leaves. Cost linear in the nodes.
-    pub(super) fn new(forest: &'a Forest, coefficients: &'a [[f64; 3]]) -> Self {
-        let bases = [CellShape::Square, CellShape::Triangle].map(|shape| forest.basis(shape));
-        let mut bilinear = Vec::new();
-        if bases.iter().all(|b| b.is_nested() && b.order() <= 2) {
-            // each function by its values at three or four corners
-            let forms = bases.map(|basis| {
-                let at = |x: [f64; 2]| {
-                    let mut values = [0.0; MOST];
-                    basis.eval(x, &mut values);
-                    values
-                };
-                let [o, s, t, st] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]].map(at);
-                let square = if basis.shape() == CellShape::Square { 1.0 } else { 0.0 };
-                let form = |i: usize| [o[i], s[i] - o[i], t[i] - o[i], square * (st[i] - s[i] - t[i] + o[i])];
-                (0..basis.len()).map(form).collect::<Vec<[f64; 4]>>()
-            });
-            let stride = forest.stride();
-            bilinear = vec![[[0.0; 3]; 4]; forest.len()];
-            for (n, (node, out)) in forest.nodes().iter().zip(&mut bilinear).enumerate() {
-                if node.first_child == 0 {
-                    let forms = &forms[usize::from(node.cell.shape == CellShape::Triangle)];
-                    for (form, c) in forms.iter().zip(&coefficients[n * stride..]) {
-                        for (o, f) in out.iter_mut().zip(form) {
-                            (0..3).for_each(|k| o[k] += f * c[k]);
-                        }
-                    }
+/// `a + b s + c t + d s t`, in the form in which rays read it fastest.
+pub(super) type Form = [[f64; 3]; 4];
+
+/// The form of coefficients on each leaf, for bases up to the second order; empty for others. Cost linear in the nodes.
+pub(super) fn bilinear(forest: &Forest, coefficients: &[[f64; 3]]) -> Vec<Form> {
+    let bases = [CellShape::Square, CellShape::Triangle].map(|shape| forest.basis(shape));
+    if !bases.iter().all(|b| b.is_nested() && b.order() <= 2) {
+        return Vec::new();
+    }
+    // each function by its values at three or four corners
+    let forms = bases.map(|basis| {
+        let at = |x: [f64; 2]| {
+            let mut values = [0.0; MOST];
+            basis.eval(x, &mut values);
+            values
+        };
+        let [o, s, t, st] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]].map(at);
+        let square = if basis.shape() == CellShape::Square { 1.0 } else { 0.0 };
+        let form = |i: usize| [o[i], s[i] - o[i], t[i] - o[i], square * (st[i] - s[i] - t[i] + o[i])];
+        (0..basis.len()).map(form).collect::<Vec<[f64; 4]>>()
+    });
+    let stride = forest.stride();
+    let form = |(node, own): (&Node, &[[f64; 3]])| {
+        let mut out = [[0.0; 3]; 4];
+        if node.first_child == 0 {
+            let forms = &forms[usize::from(node.cell.shape == CellShape::Triangle)];
+            for (form, c) in forms.iter().zip(own) {
+                for (o, f) in out.iter_mut().zip(form) {
+                    (0..3).for_each(|k| o[k] += f * c[k]);
                 }
             }
         }
+        out
+    };
+    forest.nodes().iter().zip(coefficients.chunks(stride)).map(form).collect()
+}
+
+impl<'a> Field<'a> {
+    /// Coefficients at the leaves and their [`bilinear`] forms.
+    pub(super) fn new(forest: &'a Forest, coefficients: &'a [[f64; 3]], bilinear: &'a [Form]) -> Self {
         Field { forest, coefficients, bilinear }
     }
 
