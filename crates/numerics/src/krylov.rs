@@ -47,7 +47,7 @@ impl<const C: usize> Gmres<C> {
             right: vec![norm],
             done: norm.iter().all(|n| *n == 0.0),
         };
-        solver.basis.push(scaled(&residual, norm));
+        solver.basis.push(scaled(residual, norm));
         solver
     }
 
@@ -118,7 +118,7 @@ impl<const C: usize> Gmres<C> {
         self.factor.push(column);
         self.right.push(next);
         self.done = finished || norm.iter().all(|n| *n == 0.0);
-        self.basis.push(scaled(&product, norm));
+        self.basis.push(scaled(product, norm));
     }
 
     /// The best solution so far.
@@ -161,9 +161,10 @@ fn dot<const C: usize>(w: &[f64], a: &[[f64; C]], b: &[[f64; C]]) -> [f64; C] {
     sum
 }
 
-fn scaled<const C: usize>(v: &[[f64; C]], norm: [f64; C]) -> Vec<[f64; C]> {
+fn scaled<const C: usize>(mut v: Vec<[f64; C]>, norm: [f64; C]) -> Vec<[f64; C]> {
     let inverse = norm.map(|n| if n > 0.0 { 1.0 / n } else { 0.0 });
-    v.iter().map(|v| std::array::from_fn(|c| v[c] * inverse[c])).collect()
+    v.iter_mut().for_each(|v| (0..C).for_each(|c| v[c] *= inverse[c]));
+    v
 }
 
 #[cfg(test)]

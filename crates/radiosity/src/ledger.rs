@@ -26,7 +26,7 @@ pub struct Ledger {
 }
 
 /// Points an axis at which the lit part of an element is looked for.
-const LOOKS: u32 = 8;
+const LOOKS: u32 = 4;
 
 /// Mean irradiance of an element that is partly inside of something, where it is dark.
 fn lit_mean(solution: &Solution, kernel: &LightKernel, leaf: usize, side: usize) -> Rgb {

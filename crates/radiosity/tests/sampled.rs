@@ -320,3 +320,45 @@ fn direct_light_gathered_anew_makes_shadows_crisp() {
     let [blurred, crisp] = [miss(&fitted), miss(&exact)];
     assert!(crisp < 0.7 * blurred, "{crisp} against {blurred}");
 }
+
+#[test]
+fn full_shadow_stays_dark_where_light_is_gathered_anew() {
+    let level = |x: [f64; 2], y: f64, z: [f64; 2]| [[x[0], y, z[0]], [x[0], y, z[1]], [x[1], y, z[1]], [x[1], y, z[0]]];
+    let (half, height, blocker) = (0.05, 2.0, [[-0.37, 0.39], [-0.41, 0.43]]);
+    let mut lamp = level([-half, half], height, [-half, half]);
+    lamp.reverse();
+    let faces = [
+        (level([-2.0, 2.0], 0.0, [-2.0, 2.0]), Rgb::BLACK, Rgb::BLACK),
+        (lamp, Rgb::BLACK, Rgb::grey(1.0)),
+        (level(blocker[0], 0.5, blocker[1]), Rgb::BLACK, Rgb::BLACK),
+    ];
+    let mut solver =
+        Solver::new(samples::quads("hard", &faces), Settings { error: 0.01, ..Settings::default() }).unwrap();
+    while solver.step().is_some() {}
+    let solution = solver.into_kept();
+    let prober = Prober::new(&solution).with_exact_direct_light().unwrap();
+    // nothing reflects: a sum over the lamp's points is all there is
+    let truth = |p: [f64; 2]| {
+        let n = 64;
+        let mut sum = 0.0;
+        for k in 0..n * n {
+            let l = [k % n, k / n].map(|i| half * (2.0 * (f64::from(i) + 0.5) / f64::from(n) - 1.0));
+            let at = [0, 1].map(|c| p[c] + 0.25 * (l[c] - p[c]));
+            let hidden = (0..2).all(|c| (blocker[c][0]..blocker[c][1]).contains(&at[c]));
+            let square = (0..2).map(|c| (l[c] - p[c]).powi(2)).sum::<f64>() + height * height;
+            sum += if hidden { 0.0 } else { height * height / (square * square) };
+        }
+        sum * (2.0 * half / f64::from(n)).powi(2)
+    };
+    let (mut seen, mut worst) = (0, 0.0f64);
+    for k in 0..3000 {
+        let at = [0.3 + 0.4 * f64::from(k % 60) / 60.0, 0.3 + 0.4 * f64::from(k / 60) / 50.0];
+        if prober.is_penumbra(solution.forest().locate(0, at).0) {
+            let p = solution.point(0, at);
+            worst = worst.max((prober.irradiance(0, at).0[0] - truth([p.x, p.z])).abs());
+            seen += 1;
+        }
+    }
+    let lit = truth([0.8, 0.0]);
+    assert!(seen > 100 && worst < 0.05 * lit, "{seen} points, off by {} of what is lit", worst / lit);
+}

@@ -24,6 +24,7 @@ struct Node {
     low: DVec3,
     high: DVec3,
     power: f64,
+    area: f64,
     /// Children, or none for the one lamp of a leaf.
     children: Option<[u32; 2]>,
     lamp: u32,
@@ -85,13 +86,15 @@ impl Lamps {
 
     /// Appends the node of some lamps, and those below it; its index.
     fn grow(&mut self, order: &mut [u32]) -> u32 {
-        let (mut low, mut high, mut power) = (DVec3::INFINITY, DVec3::NEG_INFINITY, 0.0);
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let (mut power, mut area) = (0.0, 0.0);
         for &k in order.iter() {
             let lamp = &self.lamps[k as usize];
-            (low, high, power) = (low.min(lamp.low), high.max(lamp.high), power + lamp.power);
+            (low, high) = (low.min(lamp.low), high.max(lamp.high));
+            (power, area) = (power + lamp.power, area + lamp.area);
         }
         let index = self.nodes.len();
-        self.nodes.push(Node { low, high, power, children: None, lamp: order[0] });
+        self.nodes.push(Node { low, high, power, area, children: None, lamp: order[0] });
         if order.len() > 1 {
             let size = high - low;
             let axis = if size.x >= size.y.max(size.z) {
@@ -134,26 +137,26 @@ impl Lamps {
         Some((node.lamp, probability, u.clamp(0.0, 1.0 - 1e-16)))
     }
 
-    /// What a node may bring, roughly; 0 only if it is nothing.
+    /// What a node may bring, roughly; 0 only if it is nothing. From its nearest point, as long lamps are close to some
+    /// of what they light: by their middles, a strip that gives nearly all light nearby would hardly ever be chosen.
     fn importance(&self, node: &Node, x: DVec3, n: DVec3) -> f64 {
-        let (centre, radius) = (0.5 * (node.low + node.high), 0.5 * (node.high - node.low).length());
-        let d = centre - x;
-        let reach = n.abs().dot(0.5 * (node.high - node.low));
-        let height = n.dot(d) + reach;
+        let middle = 0.5 * (node.low + node.high) - x;
+        let height = n.dot(middle) + n.abs().dot(0.5 * (node.high - node.low));
         if height <= 0.0 {
             return 0.0;
         }
-        let distance = d.length().max(0.5 * radius);
-        let mut cosines = (height / distance).min(1.0);
+        let square = x.clamp(node.low, node.high).distance_squared(x);
+        let cosine = |above: f64| if above * above < square { above / square.sqrt() } else { 1.0 };
+        let mut cosines = cosine(height);
         if node.children.is_none() {
             let lamp = &self.lamps[node.lamp as usize];
             let behind = lamp.normal.dot(x - lamp.origin);
             if behind <= 0.0 {
                 return 0.0;
             }
-            cosines *= (behind / distance).clamp(1e-3, 1.0);
+            cosines *= cosine(behind).max(1e-3);
         }
-        node.power * cosines / (distance * distance)
+        node.power * cosines / node.area.max(PI * square)
     }
 
     /// A point on some lamp, for a point with a unit normal, from three numbers in [0, 1).

@@ -11,7 +11,7 @@
 use super::field::{self, Field, Form};
 use super::gather;
 use super::verdict::Verdict;
-use super::{Phase, RAYS_A_STEP, Sampled, positive, stitch};
+use super::{Phase, RAYS_A_STEP, Sampled, Scratch, positive, stitch};
 use crate::solver::Event;
 use ondelette_numerics::krylov::Gmres;
 use ondelette_numerics::{par, seed};
@@ -58,8 +58,9 @@ pub(super) struct Spread {
 impl Sampled {
     /// Begins a sweep of the present solution.
     pub(super) fn start_sweeping(&mut self) {
-        let mut radiosity = self.direct_light();
-        let direct = self.integral(&radiosity);
+        let Scratch { values, mut forms } = std::mem::take(&mut self.scratch);
+        let mut radiosity = self.direct_light(values);
+        let direct = self.integral_of_direct();
         self.add_indirect(&self.indirect, &mut radiosity);
         self.amplification = 1.0 / (1.0 - self.highest_reflectance());
         if self.corrections > 0 && direct > 0.0 {
@@ -68,7 +69,7 @@ impl Sampled {
         }
         self.reflect(&mut radiosity, true);
         let empty = vec![[0.0; 3]; self.indirect.len()];
-        let forms = field::bilinear(&self.forest, &radiosity);
+        field::bilinear(&self.forest, &radiosity, &mut forms);
         self.phase = Phase::Sweeping(Sweep { radiosity, forms, gathered: empty.clone(), apart: empty, done: 0 });
     }
 
@@ -108,6 +109,7 @@ impl Sampled {
 
     /// Solves for what a sweep left over, or goes on if that is little.
     fn correct(&mut self, sweep: Sweep) {
+        self.scratch = Scratch { values: sweep.radiosity, forms: sweep.forms };
         let pairs = sweep.gathered.iter().zip(&self.indirect);
         let residual = pairs.map(|(g, i)| std::array::from_fn(|c| g[c] - i[c])).collect();
         let gmres = Gmres::new(self.indirect.clone(), residual, self.weights());
@@ -141,7 +143,7 @@ impl Sampled {
     }
 
     /// x - K r x with the first samples.
-    fn apply(&self, x: &[[f64; 3]]) -> Vec<[f64; 3]> {
+    fn apply(&mut self, x: &[[f64; 3]]) -> Vec<[f64; 3]> {
         let mut product = self.pass_on(x);
         for (p, x) in product.iter_mut().zip(x) {
             (0..3).for_each(|c| p[c] = x[c] - p[c]);
@@ -150,11 +152,13 @@ impl Sampled {
     }
 
     /// K r x with the first samples.
-    fn pass_on(&self, x: &[[f64; 3]]) -> Vec<[f64; 3]> {
-        let mut values = vec![[0.0; 3]; self.forest.len() * self.forest.stride()];
+    fn pass_on(&mut self, x: &[[f64; 3]]) -> Vec<[f64; 3]> {
+        let Scratch { mut values, mut forms } = std::mem::take(&mut self.scratch);
+        values.clear();
+        values.resize(self.forest.len() * self.forest.stride(), [0.0; 3]);
         self.add_indirect(x, &mut values);
         self.reflect(&mut values, false);
-        let forms = field::bilinear(&self.forest, &values);
+        field::bilinear(&self.forest, &values, &mut forms);
         let field = Field::new(&self.forest, &values, &forms);
         let stride = self.forest.stride();
         let mut out = vec![[0.0; 3]; self.gathers.len() * stride];
@@ -163,6 +167,7 @@ impl Sampled {
                 self.gathers[chunk * 16 + k].gather(&field, own);
             }
         });
+        self.scratch = Scratch { values, forms };
         out
     }
 
@@ -228,7 +233,7 @@ impl Sampled {
             *verdict = Verdict { scatter: own.hypot(passed), ..*verdict };
             verdict.doubt(usual, f64::from(self.gathers[k].drawn));
         }
-        let mut irradiance = self.direct_light();
+        let mut irradiance = self.direct_light(Vec::new());
         self.add_indirect(&smooth, &mut irradiance);
         positive::keep_positive(&self.forest, &mut irradiance);
         self.irradiance = irradiance;
@@ -261,7 +266,7 @@ impl Sampled {
 
     /// Residual relative to the whole irradiance.
     fn relative(&self, gmres: &Gmres<3>) -> f64 {
-        let whole = if self.whole > 0.0 { self.whole } else { self.integral(&self.direct_light()) };
+        let whole = if self.whole > 0.0 { self.whole } else { self.integral_of_direct() };
         let r = gmres.residual().iter().sum::<f64>() * self.counted_area.sqrt();
         if whole > 0.0 { r / whole } else { 0.0 }
     }

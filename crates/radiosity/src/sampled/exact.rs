@@ -1,8 +1,8 @@
 //! Direct light read exactly: where a fitted function blurs the edge of a shadow, the light of the lamps is looked
 //! up at the very point instead.
 
-use super::Kept;
 use super::lamps::Lamps;
+use super::{Kept, positive};
 use crate::kernel::LightKernel;
 use crate::rgb::Rgb;
 use crate::solution::Solution;
@@ -70,12 +70,20 @@ impl ExactDirect {
         let basis = forest.basis_of(leaf);
         let mut functions = [0.0; 36];
         basis.eval(x, &mut functions);
-        let mut sum = Rgb::BLACK;
+        let (mut exact, mut fitted, mut fitted_mean) = (Rgb::BLACK, Rgb::BLACK, Rgb::BLACK);
         for (g, (_, exitance)) in groups.iter().enumerate() {
             let own = &self.kept.direct[(leaf.index() * groups.len() + g) * forest.stride()..];
-            let fitted: f64 = own.iter().zip(&functions[..basis.len()]).map(|(c, f)| c * f).sum();
-            sum += *exitance * (0.5 * (values[g][0] + values[g][1]) - fitted);
+            exact += *exitance * (0.5 * (values[g][0] + values[g][1]));
+            fitted += *exitance * own.iter().zip(&functions[..basis.len()]).map(|(c, f)| c * f).sum::<f64>();
+            fitted_mean += *exitance * own[0];
         }
-        sum
+        // where slopes were lowered, what was fitted is not in the sum any more: the mean still is
+        let lowered = positive::may_be_lowered(forest, leaf, solution.coefficients());
+        let present = solution.inside(leaf, x);
+        let mean = solution.coefficients()[leaf.index() * forest.stride()];
+        Rgb(std::array::from_fn(|c| {
+            let reflected = (mean[c] - fitted_mean.0[c]).max(0.0);
+            if lowered[c] { exact.0[c] + reflected - present.0[c] } else { exact.0[c] - fitted.0[c] }
+        }))
     }
 }

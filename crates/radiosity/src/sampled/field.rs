@@ -17,10 +17,11 @@ pub(super) struct Field<'a> {
 pub(super) type Form = [[f64; 3]; 4];
 
 /// The form of coefficients on each leaf, for bases up to the second order; empty for others. Cost linear in the nodes.
-pub(super) fn bilinear(forest: &Forest, coefficients: &[[f64; 3]]) -> Vec<Form> {
+pub(super) fn bilinear(forest: &Forest, coefficients: &[[f64; 3]], out: &mut Vec<Form>) {
+    out.clear();
     let bases = [CellShape::Square, CellShape::Triangle].map(|shape| forest.basis(shape));
     if !bases.iter().all(|b| b.is_nested() && b.order() <= 2) {
-        return Vec::new();
+        return;
     }
     // each function by its values at three or four corners
     let forms = bases.map(|basis| {
@@ -36,18 +37,18 @@ pub(super) fn bilinear(forest: &Forest, coefficients: &[[f64; 3]]) -> Vec<Form> 
     });
     let stride = forest.stride();
     let form = |(node, own): (&Node, &[[f64; 3]])| {
-        let mut out = [[0.0; 3]; 4];
+        let mut sum = [[0.0; 3]; 4];
         if node.first_child == 0 {
             let forms = &forms[usize::from(node.cell.shape == CellShape::Triangle)];
             for (form, c) in forms.iter().zip(own) {
-                for (o, f) in out.iter_mut().zip(form) {
+                for (o, f) in sum.iter_mut().zip(form) {
                     (0..3).for_each(|k| o[k] += f * c[k]);
                 }
             }
         }
-        out
+        sum
     };
-    forest.nodes().iter().zip(coefficients.chunks(stride)).map(form).collect()
+    out.extend(forest.nodes().iter().zip(coefficients.chunks(stride)).map(form));
 }
 
 impl<'a> Field<'a> {

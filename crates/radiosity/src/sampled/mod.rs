@@ -35,6 +35,7 @@ use crate::solution::{Solution, Statistics};
 use crate::solver::{Event, SolveError};
 use balance::{Spread, Sweep};
 use direct::Known;
+use field::Form;
 use gather::{Draw, Gather};
 use lamps::Lamps;
 use ondelette_compress::{Forest, Links, NodeId, transport};
@@ -106,6 +107,8 @@ pub(crate) struct Sampled {
     counted_area: f64,
     /// Integral of the irradiance over counted sides, channels summed; 0 before the first balance.
     whole: f64,
+    /// The part of it that is reflected light.
+    reflected: f64,
     /// Counted bytes that elements and samples may take, and whether only the first samples are stored.
     cap: Option<u64>,
     streaming: bool,
@@ -127,6 +130,14 @@ pub(crate) struct Sampled {
     missed: Vec<f64>,
     error: f64,
     statistics: Statistics,
+    scratch: Scratch,
+}
+
+/// Arrays that every sweep works in, kept from one to the next.
+#[derive(Default)]
+struct Scratch {
+    values: Vec<[f64; 3]>,
+    forms: Vec<Form>,
 }
 
 /// Area of the sides that the promise counts.
@@ -196,6 +207,8 @@ impl Sampled {
             gathers,
             phase: Phase::Finished,
             whole: 0.0,
+            reflected: 0.0,
+            scratch: Scratch::default(),
             cap: None,
             streaming: false,
             amplification: 1.0,
@@ -381,9 +394,10 @@ impl Sampled {
     }
 
     /// Direct light at the leaves.
-    fn direct_light(&self) -> Vec<[f64; 3]> {
+    fn direct_light(&self, mut values: Vec<[f64; 3]>) -> Vec<[f64; 3]> {
         let (groups, stride) = (self.lamps.groups.len(), self.forest.stride());
-        let mut values = vec![[0.0; 3]; self.forest.len() * stride];
+        values.clear();
+        values.resize(self.forest.len() * stride, [0.0; 3]);
         for (n, node) in self.forest.nodes().iter().enumerate() {
             if node.first_child == 0 {
                 for (g, (_, exitance)) in self.lamps.groups.iter().enumerate() {
@@ -446,6 +460,23 @@ impl Sampled {
                 let own = &values[n * stride..n * stride + basis.len()];
                 let mean = basis.mean(own, [0.0; 3], |a, b, k| (Rgb(a) + Rgb(b) * k).0);
                 sum += node.measure * f64::from(self.lit[n]) * mean.iter().sum::<f64>();
+            }
+        }
+        sum
+    }
+
+    /// That of direct light.
+    fn integral_of_direct(&self) -> f64 {
+        let (groups, stride) = (self.lamps.groups.len(), self.forest.stride());
+        let mut sum = 0.0;
+        for (n, node) in self.forest.nodes().iter().enumerate() {
+            if node.first_child == 0 && self.counts(node.cell.root) {
+                let basis = self.forest.basis(node.cell.shape);
+                let own = self.direct[n * groups * stride..].chunks(stride).zip(&self.lamps.groups);
+                let mean = own.map(|(d, (_, exitance))| {
+                    exitance.sum() * basis.mean(&d[..basis.len()], 0.0, |a, b: f64, k| a + b * k)
+                });
+                sum += node.measure * f64::from(self.lit[n]) * mean.sum::<f64>();
             }
         }
         sum

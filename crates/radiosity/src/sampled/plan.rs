@@ -55,6 +55,7 @@ impl Sampled {
     /// Estimates the error, and plans what comes next.
     pub(super) fn judge(&mut self, unsolved: f64) -> Event {
         self.whole = self.integral(&self.irradiance);
+        self.reflected = (self.whole - self.integral_of_direct()).max(0.0);
         self.missed = self.missed_by_side();
         let missed: f64 = self.missed.iter().sum();
         let apart = self.kinds().iter().map(|k| k.error * k.error).sum::<f64>().sqrt();
@@ -164,9 +165,7 @@ impl Sampled {
 
     /// Plans the next batch: direct light first, then the gathered.
     pub(super) fn spend(&mut self) {
-        let mut values = self.direct_light();
-        self.add_indirect(&self.indirect, &mut values);
-        self.whole = self.integral(&values);
+        self.whole = self.integral_of_direct() + self.reflected;
         loop {
             let aim = self.aim * self.settings.error * self.whole / (SAFETY * self.overlap);
             let [direct, lamps, scatter, misfit] = shares(self.kinds(), aim);
