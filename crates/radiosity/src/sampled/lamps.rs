@@ -277,23 +277,27 @@ impl Lamps {
         key: u64,
         out: &mut [[f64; 2]],
     ) {
+        // whole numbers of rays that add up as planned: none for most of the faint lamps
+        let mut carried = [0, 1].map(|half| seed::unit(seed::combine(key, half)));
         for &(k, share) in crowded {
-            let lamp = &self.lamps[k as usize];
-            if lamp.element.normal().dot(x - lamp.centre) <= 0.0 {
+            let planned = 0.5 * rays * f64::from(share);
+            carried.iter_mut().for_each(|c| *c += planned);
+            if carried[0].max(carried[1]) < 1.0 {
                 continue;
             }
-            let rays = rays * f64::from(share);
+            let lamp = &self.lamps[k as usize];
+            let is_behind = lamp.element.normal().dot(x - lamp.centre) <= 0.0;
             let mut clipped = None;
-            for (half, out) in out[lamp.group].iter_mut().enumerate() {
-                // a whole number of rays, on average as many as planned; none for most of the faint lamps
-                let key = seed::combine(seed::combine(key, half as u64), lamp.side as u64);
-                let count = (0.5 * rays + seed::unit(key)).floor();
-                if count == 0.0 {
+            for (half, carried) in carried.iter_mut().enumerate() {
+                let count = *carried as u32;
+                *carried -= f64::from(count);
+                if count == 0 || is_behind {
                     continue;
                 }
                 let polygon = clipped.get_or_insert_with(|| lamp.polygon.clipped(x, n));
-                let chance = (0.5 * rays).min(1.0);
-                *out += self.sampled(kernel, lamp, polygon, side, (x, n), (key, count as u32)) / chance;
+                let key = seed::combine(seed::combine(key, half as u64), lamp.side as u64);
+                let brings = self.sampled(kernel, lamp, polygon, side, (x, n), (key, count));
+                out[lamp.group][half] += brings / planned.min(1.0);
             }
         }
     }
