@@ -82,7 +82,7 @@ impl Record<'_> {
     /// Whether the ledger closes as far as the promised error allows: more energy than that cannot go astray unless the
     /// scene has something that the solver misjudges.
     fn closes(&self, ledger: &Ledger) -> bool {
-        ledger.closure().abs() <= 0.01 + 2.0 * self.solution.settings().error
+        ledger.closure().abs() <= 0.01 + self.solution.settings().error
     }
 
     /// The report as JSON. Powers are in the unit of the scene's power, lengths in metres, times in seconds; what is

@@ -338,3 +338,18 @@ fn links_are_lit_anew_without_a_ray() {
         }
     }
 }
+
+#[test]
+fn what_was_black_when_links_were_made_is_not_lit_anew_in_silence() {
+    let mut scene = coloured_room();
+    let wall = scene.material(scene.sides[2]).name.clone();
+    scene.paint(&Paint::Reflectance(wall.clone(), Rgb::BLACK)).unwrap();
+    for (method, basis) in [(Method::Classical, "haar"), (Method::Wavelet, "m2")] {
+        let solution = solve(&scene, settings(method, basis, 0.1, Iteration::Gmres));
+        let mut solver = Solver::resume(&solution).unwrap();
+        for paint in [Paint::Reflectance(wall.clone(), Rgb::grey(0.3)), Paint::Emission(wall.clone(), Rgb::grey(1.0))] {
+            let refused = solver.relight(&[paint]).unwrap_err().to_string();
+            assert!(refused.contains(&wall) && refused.contains("solve the scene anew"), "{refused}");
+        }
+    }
+}

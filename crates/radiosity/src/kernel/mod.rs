@@ -69,7 +69,7 @@ impl LightKernel {
                     tangents: [along, normal.cross(along)],
                     area: patch.area(),
                     patch: side.patch,
-                    shoots: material.radiance.max() > 0.0 || material.reflectance.max() > 0.0,
+                    shoots: material.sends_light(),
                     shape: match patch.shape {
                         Shape::Parallelogram => CellShape::Square,
                         Shape::Triangle => CellShape::Triangle,

@@ -5,6 +5,7 @@
 
 use super::gather::{Gather, Point, Ray};
 use super::lamps::Lamps;
+use super::plan::MOST_LAMP_RAYS;
 use super::{Phase, Sampled, counted_area, plan};
 use crate::kernel::LightKernel;
 use crate::scene::{Paint, PaintError, Scene};
@@ -61,6 +62,9 @@ impl Kept {
         let all = |values: &[f32]| values.iter().all(|v| v.is_finite() && *v >= 0.0);
         if !all(&self.misfit) || !all(&self.scatter) || !all(&self.lamp_rays) {
             return Err("an error or a number of rays that is negative or no number".into());
+        }
+        if self.lamp_rays.iter().any(|r| f64::from(*r) > MOST_LAMP_RAYS) {
+            return Err(format!("more than {MOST_LAMP_RAYS} rays to the lamps at a point"));
         }
         if !self.direct.iter().all(|v| v.is_finite()) {
             return Err("direct light that is no number".into());

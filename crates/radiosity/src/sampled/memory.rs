@@ -2,7 +2,8 @@
 //! they are read.
 //!
 //! The first samples of every element, which iterations read over and over, always stay. The others are read once a
-//! sweep; a sweep of all samples costs their rays then, and the answer is the same but for rounding.
+//! sweep; a sweep of all samples costs their rays then, and finds the same. Fits of direct light begin anew under a
+//! cap, with other rays: another answer that keeps the same promise.
 
 use super::direct::Known;
 use super::gather::{Draw, Gather, Point, Ray};

@@ -41,7 +41,7 @@ pub(super) const FLOOR: f64 = 0.4;
 /// A misfit larger than this many of its standard deviations is one.
 const SIGNIFICANT: f64 = 1.5;
 /// Most rays of a point to the lamps where they scatter, and the factor of them below which more are not worth it.
-const MOST_LAMP_RAYS: f64 = 16_384.0;
+pub(super) const MOST_LAMP_RAYS: f64 = 16_384.0;
 const ENOUGH_LAMP_RAYS: f64 = 1.2;
 /// Deepest split.
 const DEEPEST: u32 = 16;
@@ -289,7 +289,8 @@ impl Sampled {
             if self.counts(node.cell.root) {
                 let missed = node.measure * MEAN_OF_MISFIT * verdict.misfit.max(0.0).sqrt();
                 // what scatter alone may pretend is left alone
-                if verdict.misfit > SIGNIFICANT * verdict.certainty && node.cell.depth < DEEPEST {
+                let has_room = node.cell.depth < DEEPEST && gather.points() as usize + 4 <= Gather::MOST_POINTS;
+                if verdict.misfit > SIGNIFICANT * verdict.certainty && has_room {
                     worst.push((missed, k));
                 }
             }

@@ -102,6 +102,11 @@ pub struct Material {
 }
 
 impl Material {
+    /// Whether anything made of it ever sends light.
+    pub fn sends_light(&self) -> bool {
+        self.radiance.max() > 0.0 || self.reflectance.max() > 0.0
+    }
+
     /// Whether it only emits: such sides receive too, but the promised error does not count them.
     pub fn is_pure_emitter(&self) -> bool {
         self.reflectance.max() == 0.0 && self.radiance.max() > 0.0

@@ -32,6 +32,15 @@ pub enum PaintError {
         /// The worst channel.
         value: f64,
     },
+    /// A solution with links, in which nothing links this material's light.
+    #[error(
+        "'{name}' neither shone nor reflected when the scene was solved, so that nothing links its light: solve the \
+         scene anew with a trace of it (a reflectance of 0.001), or with --method sampled"
+    )]
+    Unlinked {
+        /// The material.
+        name: String,
+    },
     /// Not a reflectance.
     #[error(
         "'{name}' cannot reflect {value}: a reflectance lies in [0, 1), for no surface reflects all the light it gets"

@@ -34,8 +34,18 @@ impl Linked {
     }
 
     /// Paints materials, and begins the balance again.
+    ///
+    /// # Errors
+    /// Paint that does not fit, and light from sides that were black before: nothing links it.
     pub(crate) fn paint(&mut self, paints: &[Paint]) -> Result<(), PaintError> {
-        self.scene = Arc::new(self.scene.painted(paints)?);
+        let painted = self.scene.painted(paints)?;
+        for (side, frame) in painted.sides.iter().zip(self.kernel.sides()) {
+            let material = painted.material(*side);
+            if !frame.shoots && material.sends_light() {
+                return Err(PaintError::Unlinked { name: material.name.clone() });
+            }
+        }
+        self.scene = Arc::new(painted);
         self.begin_again();
         Ok(())
     }
