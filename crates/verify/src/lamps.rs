@@ -300,4 +300,21 @@ mod tests {
             }
         }
     }
+
+    /// A strip of light right beside a point gives it most of its light, and most samples go there, however far away
+    /// the middle of the strip is.
+    #[test]
+    fn long_lamps_are_chosen_where_they_are_close() {
+        let white = Rgb::grey(std::f64::consts::FRAC_1_PI);
+        let strip = [[2.0, -2.0, 0.0], [2.0, -2.0, 0.002], [2.0, 2.0, 0.002], [2.0, 2.0, 0.0]];
+        let panel = [[-0.25, 0.25, 2.5], [0.25, 0.25, 2.5], [0.25, -0.25, 2.5], [-0.25, -0.25, 2.5]];
+        let scene = samples::quads("strip", &[(strip, Rgb::BLACK, white), (panel, Rgb::BLACK, white)]);
+        let (lamps, _) = Lamps::of(&scene);
+        let picked = |x: f64| {
+            let at = DVec3::new(x, 0.2, 0.0);
+            let picks = (0..1000).filter_map(|k| lamps.pick(at, DVec3::Z, (f64::from(k) + 0.5) / 1000.0));
+            picks.filter(|p| lamps.lamps[p.0 as usize].low.x > 1.0).count()
+        };
+        assert!(picked(1.995) > 500 && picked(0.0) < 500, "{} {}", picked(1.995), picked(0.0));
+    }
 }

@@ -160,7 +160,7 @@ const SIGNIFICANT: f64 = 1.0;
 
 /// Among many things light has features finer than the points of an element can tell: what they say of its error is low
 /// by about this factor (against independent paths in furnished rooms).
-const DOUBT: f64 = 1.3;
+const DOUBT: f64 = 1.35;
 
 /// Share of a dark element that a lit corner speaks for: half of what lies between the outer points and the rim.
 const BESIDE: f64 = 1.0 / 16.0;
