@@ -22,8 +22,11 @@ const RESTART: usize = 30;
 const READS_A_STEP: usize = 1 << 20;
 /// Most solves for one set of samples.
 const MOST_CORRECTIONS: u32 = 12;
-/// Draws of signs for the scatter.
+/// Draws of signs for the scatter; so many elements are a sample of their own, and one draw is enough. What the mean
+/// absolute value of a sum of so many squares' root lacks is then made up for.
 const PATTERNS: u64 = 3;
+const MANY: usize = 30_000;
+const ONE_FOR_ALL: f64 = 1.155;
 /// The part of the scatter that others pass on is wanted to this share of the scatter.
 const SPREAD_TOLERANCE: f64 = 0.15;
 /// Most Krylov vectors for it.
@@ -203,12 +206,14 @@ impl Sampled {
         for (sum, v) in spread.passed.iter_mut().zip(spread.gmres.solution()) {
             (0..3).for_each(|c| sum[c] += v[c] * v[c]);
         }
-        if spread.pattern + 1 < PATTERNS {
+        let (patterns, factor) = if self.gathers.len() > MANY { (1, ONE_FOR_ALL) } else { (PATTERNS, 1.0) };
+        if spread.pattern + 1 < patterns {
             self.start_spreading(spread.apart, spread.passed, spread.pattern + 1, spread.unsolved);
             let (iterations, residual) = (self.statistics.iterations, self.statistics.residual);
             return Event::Iterated { iterations, residual, wanted: residual };
         }
-        let passed: Vec<[f64; 3]> = spread.passed.iter().map(|s| s.map(|s| (s / PATTERNS as f64).sqrt())).collect();
+        let root = |s: f64| factor * (s / patterns as f64).sqrt();
+        let passed: Vec<[f64; 3]> = spread.passed.iter().map(|s| s.map(root)).collect();
         self.settle(&spread.apart, &passed);
         self.judge(spread.unsolved)
     }

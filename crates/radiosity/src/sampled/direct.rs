@@ -158,10 +158,6 @@ fn share_of(open: usize, points: usize, shape: CellShape, open_corners: impl FnO
 /// A misfit below this many of its standard deviations is taken for scatter.
 const SIGNIFICANT: f64 = 1.0;
 
-/// Among many things light has features finer than the points of an element can tell: what they say of its error is low
-/// by about this factor (against independent paths in furnished rooms).
-const DOUBT: f64 = 1.35;
-
 /// Share of a dark element that a lit corner speaks for: half of what lies between the outer points and the rim.
 const BESIDE: f64 = 1.0 / 16.0;
 
@@ -300,7 +296,7 @@ pub(super) fn fit(
     let values: Vec<[f64; 2]> = found.iter().zip(&cut).map(|(found, cut)| found.map(|f| f + cut)).collect();
     let fresh = rays - known.map_or(0.0, |k| k.rays);
     let work = [seen.work(), crowded.iter().map(|c| fresh * f64::from(c.1)).sum()].map(|w: f64| w * count as f64);
-    let doubt = if seen.is_crowded() || !crowded.is_empty() { DOUBT } else { 1.0 };
+    let doubt = if seen.is_crowded() || !crowded.is_empty() { lamps.doubt } else { 1.0 };
     let known = (!crowded.is_empty()).then(|| Known::of(&cut, &found, count, crowded, rays));
     // where no lamp shines it may be dark inside of something
     let dark = |q: usize| (0..groups).all(|g| values[g * count + q] == [0.0; 2]) && is_buried(grid.points[q]);

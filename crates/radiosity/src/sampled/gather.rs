@@ -66,6 +66,14 @@ pub(super) struct Gather {
     fit: Vec<f64>,
 }
 
+/// How many points an element gathers at, at first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Grain {
+    Fine,
+    Coarse,
+    Tiny,
+}
+
 /// Directions to draw for some points of a gather.
 #[derive(Clone, Debug)]
 pub(super) struct Draw {
@@ -93,11 +101,19 @@ impl Gather {
     /// Directions of a point and half that iterations use; sweeps use all.
     pub(super) const FIRST: u32 = 8;
 
-    /// At a point in each of 16 (or, if not `fine`, 4) equal parts, without samples.
-    pub(super) fn new(forest: &Forest, node: NodeId, fine: bool) -> Self {
+    /// At a point in each of 16 or 4 equal parts, or in two of these 4, without samples.
+    pub(super) fn new(forest: &Forest, node: NodeId, grain: Grain) -> Self {
         let cell = forest.node(node).cell;
         let shape = cell.shape;
-        let points = strata(shape, if fine { 2 } else { 1 }, seed::combine(cell.key, 0x6761_7468));
+        let key = seed::combine(cell.key, 0x6761_7468);
+        let mut points = strata(shape, if grain == Grain::Fine { 2 } else { 1 }, key);
+        if grain == Grain::Tiny {
+            let first = (seed::unit(key) * points.len() as f64) as usize;
+            points.rotate_left(first);
+            let second = 1 + (seed::unit(seed::combine(key, 0)) * (points.len() - 1) as f64) as usize;
+            points.swap(1, second);
+            points.truncate(2);
+        }
         Gather {
             node,
             lit: vec![false; points.len()],
@@ -266,7 +282,7 @@ impl Gather {
         let mut place = vec![(0, 0); self.points.len()];
         let mut children: Vec<Gather> = (0..shape.arity())
             .map(|c| {
-                let mut child = Gather::new(forest, forest.child(self.node, c), false);
+                let mut child = Gather::new(forest, forest.child(self.node, c), Grain::Coarse);
                 child.points.clear();
                 child.lit.clear();
                 child.drawn = self.drawn;

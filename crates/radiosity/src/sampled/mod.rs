@@ -36,7 +36,7 @@ use crate::solver::{Event, SolveError};
 use balance::{Spread, Sweep};
 use direct::Known;
 use field::Form;
-use gather::{Draw, Gather};
+use gather::{Draw, Gather, Grain};
 use lamps::Lamps;
 use ondelette_compress::{Forest, Links, NodeId, transport};
 use ondelette_numerics::krylov::Gmres;
@@ -48,6 +48,8 @@ use verdict::Verdict;
 const FIRST_SHARE: f64 = 1.0 / 256.0;
 /// Elements below this share of the scene's surface gather at few points.
 const SMALL_SHARE: f64 = 1.0 / 2048.0;
+/// And below this one at hardly any: there are very many of them, which make up for one another.
+const TINY_SHARE: f64 = 1.0 / 131_072.0;
 /// Directions of a point and half in the first round.
 const FIRST_DIRECTIONS: u32 = 4;
 /// Samples cast in one step.
@@ -166,9 +168,13 @@ impl Sampled {
             n += 1;
         }
         let leaves: Vec<NodeId> = (0..forest.len() as u32).map(NodeId).filter(|&id| forest.is_leaf(id)).collect();
-        let fine = |id: NodeId| forest.node(id).measure > SMALL_SHARE * area;
+        let grain = |id: NodeId| match forest.node(id).measure / area {
+            share if share > SMALL_SHARE => Grain::Fine,
+            share if share > TINY_SHARE => Grain::Coarse,
+            _ => Grain::Tiny,
+        };
         let gathers = par::map(leaves.len(), |k| {
-            let mut gather = Gather::new(&forest, leaves[k], fine(leaves[k]));
+            let mut gather = Gather::new(&forest, leaves[k], grain(leaves[k]));
             gather.stick_out(&kernel, &forest, 0);
             gather
         });
