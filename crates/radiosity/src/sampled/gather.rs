@@ -8,13 +8,13 @@
 
 use super::direct;
 use super::field::Field;
-use super::lamps::on_cell;
+use super::points::{self, Grain, Point, strata};
 use super::verdict::Verdict;
 use crate::kernel::LightKernel;
 use ondelette_compress::{Forest, NodeId};
 use ondelette_numerics::sobol::Sobol;
 use ondelette_numerics::{dense, seed};
-use ondelette_wavelet::cell::{CellBasis, CellShape};
+use ondelette_wavelet::cell::CellBasis;
 use std::ops::Range;
 
 /// Most functions of a basis.
@@ -37,15 +37,6 @@ impl Ray {
     pub(super) const NOWHERE: u32 = u32::MAX;
 }
 
-/// A point that gathers.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Point {
-    /// Element coordinates.
-    pub(super) at: [f64; 2],
-    /// Key of its directions.
-    pub(super) key: u64,
-}
-
 /// An element that gathers.
 #[derive(Clone, Debug)]
 pub(super) struct Gather {
@@ -64,14 +55,6 @@ pub(super) struct Gather {
     pub(super) order: usize,
     /// Values at the points to coefficients of the functions in use, `[function][point]`.
     fit: Vec<f64>,
-}
-
-/// How many points an element gathers at, at first.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Grain {
-    Fine,
-    Coarse,
-    Tiny,
 }
 
 /// Directions to draw for some points of a gather.
@@ -104,16 +87,7 @@ impl Gather {
     /// At a point in each of 16 or 4 equal parts, or in two of these 4, without samples.
     pub(super) fn new(forest: &Forest, node: NodeId, grain: Grain) -> Self {
         let cell = forest.node(node).cell;
-        let shape = cell.shape;
-        let key = seed::combine(cell.key, 0x6761_7468);
-        let mut points = strata(shape, if grain == Grain::Fine { 2 } else { 1 }, key);
-        if grain == Grain::Tiny {
-            let first = (seed::unit(key) * points.len() as f64) as usize;
-            points.rotate_left(first);
-            let second = 1 + (seed::unit(seed::combine(key, 0)) * (points.len() - 1) as f64) as usize;
-            points.swap(1, second);
-            points.truncate(2);
-        }
+        let points = points::at_first(&cell, grain);
         Gather {
             node,
             lit: vec![false; points.len()],
@@ -435,23 +409,6 @@ pub(super) fn size_of(basis: &CellBasis, coefficients: &[[f64; 3]]) -> f64 {
     }
     let scale = if basis.is_nested() { 1.0 } else { 1.0 / basis.len() as f64 };
     square.iter().map(|s| (s * scale).sqrt()).sum()
-}
-
-/// A point at random in each of the parts that `levels` splits of a cell make: a mean over them has no bias.
-fn strata(shape: CellShape, levels: u32, key: u64) -> Vec<Point> {
-    let parts = shape.arity().pow(levels);
-    let place = |k: usize| {
-        let key = seed::combine(key, k as u64);
-        let mut at = on_cell(shape, [seed::unit(seed::combine(key, 1)), seed::unit(seed::combine(key, 2))]);
-        let mut path = k;
-        for _ in 0..levels {
-            let (o, sign) = shape.child(path % shape.arity());
-            path /= shape.arity();
-            at = [o[0] + 0.5 * sign * at[0], o[1] + 0.5 * sign * at[1]];
-        }
-        Point { at, key }
-    };
-    (0..parts).map(place).collect()
 }
 
 /// Drawn samples.

@@ -3,9 +3,10 @@
 //! The samples of a row say where light comes from, not how much: another emission or reflectance changes nothing in
 //! them. Direct light is kept for unit exitance of every emitting material.
 
-use super::gather::{Gather, Point, Ray};
+use super::gather::{Gather, Ray};
 use super::lamps::Lamps;
 use super::plan::MOST_LAMP_RAYS;
+use super::points::Point;
 use super::{Phase, Sampled, counted_area, plan};
 use crate::kernel::LightKernel;
 use crate::scene::{Paint, PaintError, Scene};

@@ -6,7 +6,8 @@
 //! cap, with other rays: another answer that keeps the same promise.
 
 use super::direct::Known;
-use super::gather::{Draw, Gather, Point, Ray};
+use super::gather::{Draw, Gather, Ray};
+use super::points::Point;
 use super::{Phase, Sampled};
 use crate::solver::SolveError;
 use ondelette_compress::forest::Node;
