@@ -31,7 +31,23 @@ pub enum AxisError {
     /// The domain is empty, turned round or not finite.
     #[error("domain [{0}, {1}]: give two finite numbers, the first below the second")]
     Domain(f64, f64),
+    /// Neighbouring knots would be the same number, or nearly.
+    #[error(
+        "domain [{from}, {to}] with {spans} spans: neighbouring knots cannot be told apart; use fewer spans, or \
+         numbers nearer to 0"
+    )]
+    Narrow {
+        /// Start of the domain.
+        from: f64,
+        /// End of the domain.
+        to: f64,
+        /// Spans.
+        spans: usize,
+    },
 }
+
+/// Least length of a span, as a share of the largest parameter: knots are known to a hundredth of a span.
+const APART: f64 = 1e-13;
 
 impl Axis {
     /// An axis with `spans` knot spans over `domain`.
@@ -46,7 +62,13 @@ impl Axis {
         if !(domain[0].is_finite() && domain[1].is_finite() && domain[0] < domain[1]) {
             return Err(AxisError::Domain(domain[0], domain[1]));
         }
-        Ok(Axis { boundary, spans, domain })
+        let axis = Axis { boundary, spans, domain };
+        let largest = domain[0].abs().max(domain[1].abs());
+        // Lengths and their inverses are numbers, too.
+        if !(axis.density() > 0.0 && axis.density().is_finite() && 1.0 / axis.density() >= APART * largest) {
+            return Err(AxisError::Narrow { from: domain[0], to: domain[1], spans });
+        }
+        Ok(axis)
     }
 
     /// Boundary.
@@ -87,5 +109,29 @@ impl Axis {
     /// Parameter in domain units.
     pub fn from_knots(&self, u: f64) -> f64 {
         self.domain[0] + u / self.density()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn axes_whose_knots_are_no_different_numbers_are_refused() {
+        for (spans, domain) in [
+            (64, [1e16, 1e16 + 32.0]),
+            (64, [-1e16 - 32.0, -1e16]),
+            (1 << 45, [0.0, 1.0]),
+            (4, [0.0, 1e-310]),
+            (4, [-1e308, 1e308]),
+            (64, [1e9, 1e9 + 1e-3]),
+        ] {
+            let refused = Axis::new(Boundary::Open, spans, domain);
+            assert!(matches!(refused, Err(AxisError::Narrow { .. })), "{spans} {domain:?}: {refused:?}");
+        }
+        // Map coordinates, dates in seconds.
+        for (spans, domain) in [(512, [4.5e6, 4.5e6 + 100.0]), (64, [1.7e9, 1.7e9 + 1.0]), (4096, [0.0, 1e-20])] {
+            assert!(Axis::new(Boundary::Open, spans, domain).is_ok());
+        }
     }
 }

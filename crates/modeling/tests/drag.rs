@@ -76,3 +76,100 @@ fn columns_stay_within_their_budget_and_wrong_names_are_refused() {
     assert!(matches!(handles.drag("p1", &[Some(f64::NAN)]), Err(DragError::Targets(_))));
     assert!(matches!(handles.drag("p1", &[None]), Err(DragError::Targets(_))));
 }
+
+fn position(id: &str, at: [f64; 2], to: &[Option<f64>]) -> Constraint {
+    Constraint::new(id, &at, Demand::Position(to.to_vec()))
+}
+
+fn sheet(coordinates: usize, rows: Vec<Constraint>) -> Problem {
+    let a = Axis::new(Boundary::Open, 16, [0.0, 1.0]).unwrap();
+    Problem::new(Space::surface(a, a), coordinates, Energy::BEND, None, rows).unwrap()
+}
+
+fn assert_solved(handles: &Handles, settings: Settings) {
+    for (x, y) in handles.coefficients().iter().zip(&cold(handles.problem(), settings)) {
+        let size = y.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+        let off = x.iter().zip(y).fold(0.0, |m: f64, (a, b)| m.max((a - b).abs()));
+        assert!(off <= 1e-8 * size, "{off} of {size}");
+    }
+}
+
+#[test]
+fn a_coordinate_moves_by_its_own_column_whichever_coordinates_a_normal_couples() {
+    let settings = Settings { tolerance: 1e-10, ..Settings::default() };
+    for normal in [vec![1.0, 0.0, 1.0], vec![0.0, 1.0, 1.0], vec![1.0, 1.0, 0.0]] {
+        let corner = |k: usize| [[0.1, 0.1], [0.9, 0.2], [0.2, 0.8], [0.8, 0.9]][k];
+        let to = |k: usize| corner(k).iter().copied().chain([0.3 * k as f64]).map(Some).collect::<Vec<_>>();
+        let mut rows: Vec<Constraint> = (0..4).map(|k| position(&k.to_string(), corner(k), &to(k))).collect();
+        rows.push(Constraint::new("n", &[0.5, 0.5], Demand::Normal(normal)));
+        // A slope with a free coordinate: its second row is that of the third one.
+        rows.push(Constraint::new("dt", &[0.4, 0.3], Demand::Derivative(1, vec![Some(0.1), None, Some(0.2)])));
+        let mut handles = Handles::new(sheet(3, rows), settings, usize::MAX).unwrap();
+        handles.drag("2", &[Some(0.3), Some(0.9), Some(-1.0)]).unwrap();
+        handles.drag("dt", &[Some(0.4), None, Some(1.0)]).unwrap();
+        assert_solved(&handles, settings);
+    }
+}
+
+#[test]
+fn a_point_with_one_redundant_coordinate_is_dragged_in_the_others() {
+    let settings = Settings { tolerance: 1e-10, ..Settings::default() };
+    let heights = [[0.1, 0.1], [0.9, 0.2], [0.2, 0.8], [0.8, 0.9]].into_iter().enumerate();
+    let mut rows: Vec<Constraint> =
+        heights.map(|(k, at)| position(&k.to_string(), at, &[Some(at[0]), Some(k as f64)])).collect();
+    rows.push(position("half", [0.5, 0.5], &[Some(0.5), None]));
+    rows.push(position("whole", [0.5, 0.5], &[Some(0.5), Some(1.0)]));
+    let mut handles = Handles::new(sheet(2, rows), settings, usize::MAX).unwrap();
+    handles.drag("whole", &[Some(0.5), Some(2.0)]).unwrap();
+    assert_solved(&handles, settings);
+    assert!(matches!(handles.drag("whole", &[Some(0.6), Some(2.0)]), Err(DragError::Fixed(_))));
+    assert_solved(&handles, settings);
+}
+
+#[test]
+fn a_point_is_not_dragged_away_from_its_twin() {
+    let settings = Settings::default();
+    let mut rows: Vec<Constraint> = [[0.1, 0.1], [0.9, 0.2], [0.2, 0.8]]
+        .into_iter()
+        .enumerate()
+        .map(|(k, at)| position(&k.to_string(), at, &[Some(k as f64)]))
+        .collect();
+    rows.push(position("twin", [0.9, 0.2], &[Some(1.0)]));
+    let mut handles = Handles::new(sheet(1, rows), settings, usize::MAX).unwrap();
+    let before = handles.coefficients().to_vec();
+    let refused = handles.drag("1", &[Some(5.0)]).unwrap_err().to_string();
+    assert!(refused.contains("twin contradicts 1"), "{refused}");
+    assert_eq!(handles.coefficients(), before);
+    assert_eq!(handles.problem().constraints()[1].demand, Demand::Position(vec![Some(1.0)]));
+    handles.drag("0", &[Some(5.0)]).unwrap();
+    assert_solved(&handles, settings);
+    handles.remove("twin").unwrap();
+    handles.drag("1", &[Some(5.0)]).unwrap();
+    assert_solved(&handles, settings);
+}
+
+#[test]
+fn undo_makes_the_factors_of_the_constraints_it_brings_back() {
+    let settings = Settings { tolerance: 1e-10, ..Settings::default() };
+    let rows = |b: Constraint| -> Vec<Constraint> {
+        let three = [[0.1, 0.1], [0.9, 0.2], [0.2, 0.8]].into_iter().enumerate();
+        three.map(|(k, at)| position(&k.to_string(), at, &[Some(k as f64)])).chain([b]).collect()
+    };
+    let others = [
+        position("b", [0.3, 0.4], &[Some(0.5)]),
+        position("b", [0.7, 0.6], &[Some(0.5)]).soft(2.0),
+        Constraint::new("b", &[0.7, 0.6], Demand::Derivative(1, vec![Some(0.5)])),
+    ];
+    for other in others {
+        let problem = sheet(1, rows(position("b", [0.7, 0.6], &[Some(0.5)])));
+        let mut handles = Handles::new(problem, settings, usize::MAX).unwrap();
+        handles.save();
+        handles.remove("b").unwrap();
+        handles.add(other).unwrap();
+        handles.drag("b", &[Some(1.0)]).unwrap();
+        assert!(handles.undo().unwrap());
+        handles.drag("b", &[Some(2.0)]).unwrap();
+        handles.drag("1", &[Some(-2.0)]).unwrap();
+        assert_solved(&handles, settings);
+    }
+}

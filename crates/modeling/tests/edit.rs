@@ -385,3 +385,25 @@ fn wrong_handles_are_refused_with_their_limits() {
     let mut editor = Editor::new(SurfaceLadder::new(&surface([Open, Open], [8, 8], 1)).unwrap());
     assert_eq!(editor.drag([0, 0], [1.0; 3], Orientation::Frenet), Err(EditError::FrenetSurface));
 }
+
+#[test]
+fn pulls_outside_the_domain_are_refused_and_not_moved_to_its_end() {
+    let pull = |s: f64, t: f64| [Pull { at: [s, t], orders: [0, 0], target: [Some(1.0), None, None] }];
+    let open = curve(Open, 8, 1);
+    let mut editor = Editor::new(CurveLadder::new(&open).unwrap());
+    for at in [-0.01, 2.1, 1e300] {
+        let outside = |r: Result<(), EditError>| assert!(matches!(r, Err(EditError::Outside { pull: 0, .. })), "{r:?}");
+        outside(least_squares(&mut editor, 1, &pull(at, 0.0)).map(|_| ()));
+        outside(delta_curve(&open, 1, &pull(at, 0.0)).map(|_| ()));
+        outside(pentland(&open, &pull(at, 0.0)).map(|_| ()));
+    }
+    assert_eq!(editor.shape().unwrap(), open);
+    least_squares(&mut editor, 1, &pull(2.0, 0.0)).unwrap();
+    // Parameters of periodic axes go round; those of the other axis do not.
+    let tube = surface([Periodic, Open], [8, 8], 2);
+    let mut editor = Editor::new(SurfaceLadder::new(&tube).unwrap());
+    least_squares(&mut editor, 1, &pull(1.25, 0.5)).unwrap();
+    assert!((editor.shape().unwrap().derivative([0.25, 0.5], [0, 0])[0] - 1.0).abs() < 1e-9);
+    assert!(matches!(least_squares(&mut editor, 1, &pull(0.5, 2.5)), Err(EditError::Outside { .. })));
+    assert!(matches!(delta_surface(&tube, [1, 1], &pull(0.5, -0.5)), Err(EditError::Outside { .. })));
+}

@@ -58,6 +58,9 @@ fn coordinates(constraints: &[ConstraintSpec]) -> Result<usize, String> {
 /// The demands of one constraint; the first bears its id, others say what they are.
 fn demands(spec: &ConstraintSpec, space: &Space) -> Result<Vec<Constraint>, String> {
     let id = spec.id.clone().unwrap_or_default();
+    if let Some(w) = spec.weight.filter(|w| *w > 0.0 && !(1.0 / w).is_finite()) {
+        return Err(format!("constraint {id}: weight {w:e} is as good as none: leave the constraint out"));
+    }
     if let Some(rail) = &spec.curve {
         let bare = ConstraintSpec { id: spec.id.clone(), curve: spec.curve.clone(), weight: spec.weight, ..bare() };
         if bare != *spec {

@@ -4,6 +4,7 @@ use super::constraints::constraints;
 use super::intrinsic;
 use super::shape_input::read_text;
 use super::shape_output::Outgoing;
+use super::stiffness::stiffness;
 use super::{Outcome, Refusal, tell};
 use crate::interrupt::Stop;
 use crate::plan::shape::DesignPlan;
@@ -13,7 +14,7 @@ use ondelette_io::shape::{Document, Geometry};
 use ondelette_io::write::write_bytes;
 use ondelette_modeling::Axis;
 use ondelette_modeling::constraint::{Constraint, Demand};
-use ondelette_modeling::energy::{Energy, Stiffness};
+use ondelette_modeling::energy::Energy;
 use ondelette_modeling::shape::{Curve, ParametricCurve, ParametricSurface, Surface};
 use ondelette_modeling::solve::{Method, Oracle, Residual, Settings, Solution, Solver};
 use ondelette_modeling::system::{Problem, Space};
@@ -76,6 +77,7 @@ pub(crate) fn run(plan: &DesignPlan) -> Result<Outcome, Refusal> {
         around: None,
         marks: marks(&document, problem.constraints(), problem.coordinates()),
         control: None,
+        grid: None,
     };
     out.write(&plan.out)?;
     stages.end("write");
@@ -118,26 +120,6 @@ pub(super) fn space(axes: &[Axis]) -> Space {
         [s, t] => Space::surface(s, t),
         _ => Space::curve(axes[0]),
     }
-}
-
-/// One factor a cell from the regions of the document.
-fn stiffness(document: &Document, space: &Space) -> Result<Option<Stiffness>, String> {
-    if document.stiffness.is_empty() {
-        return Ok(None);
-    }
-    let axes = &document.axes;
-    let middle = |axis: &Axis, i: usize| axis.from_knots(i as f64 + 0.5);
-    let width = axes.get(1).map_or(1, Axis::spans);
-    let factor = |cell: usize| {
-        let at: Vec<f64> = match axes.as_slice() {
-            [s, t] => vec![middle(s, cell / width), middle(t, cell % width)],
-            _ => vec![middle(&axes[0], cell)],
-        };
-        let inside = |r: &&ondelette_io::shape::Region| (0..at.len()).all(|a| (r.from[a]..=r.to[a]).contains(&at[a]));
-        document.stiffness.iter().rev().find(inside).map_or(1.0, |r| r.factor)
-    };
-    let cells = space.cells();
-    Stiffness::new(cells, (0..cells).map(factor).collect()).map(Some).map_err(|e| e.to_string())
 }
 
 fn geometry(axes: &[Axis], solution: &Solution) -> Result<Geometry, String> {

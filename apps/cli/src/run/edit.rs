@@ -25,7 +25,7 @@ pub(crate) fn run(plan: &EditPlan) -> Result<Outcome, Refusal> {
     };
     let document = Document { geometry, ..document };
     let around = (!splines.curves.is_empty() || !splines.surfaces.is_empty()).then_some((&splines, place));
-    Outgoing { document: &document, around, marks: Vec::new(), control }.write(&plan.out)?;
+    Outgoing { document: &document, around, marks: Vec::new(), control, grid: None }.write(&plan.out)?;
     Ok(Outcome::Done)
 }
 

@@ -5,9 +5,10 @@ use super::shape_output::Outgoing;
 use super::{Outcome, Refusal, tell};
 use crate::plan::shape::{FitPlan, Format};
 use crate::report::Stages;
+use ondelette_io::shape::height::{self, HeightField};
 use ondelette_io::shape::picture::Mark;
 use ondelette_io::shape::points::{self, Points};
-use ondelette_io::shape::{Document, height, svg};
+use ondelette_io::shape::{Document, YAxis, svg};
 use ondelette_io::write::write_bytes;
 use ondelette_modeling::fit::{self, FitSettings, Scatter};
 use ondelette_modeling::shape::{Curve, ParametricCurve, Surface};
@@ -22,32 +23,39 @@ pub(crate) fn run(plan: &FitPlan) -> Result<Outcome, Refusal> {
     let named = |e: String| Refusal::new(format!("{}: {e}", plan.data.display()));
     let data = read(&plan.data).map_err(named)?;
     stages.end("read");
-    let (document, marks, mut report) = match data {
-        Data::Outline(points) => {
+    let (document, marks, mut report, grid) = match data {
+        Data::Outline(points, y) => {
             plan.out.check_kind(true)?;
-            outline(plan, &points).map_err(named)?
+            let (document, marks, report) = outline(plan, &points).map_err(named)?;
+            (Document { y, ..document }, marks, report, None)
         }
-        Data::Scattered(scatter) => {
+        Data::Scattered(scatter, grid) => {
             plan.out.check_kind(false)?;
-            surface(plan, &scatter).map_err(named)?
+            let (document, marks, report) = surface(plan, &scatter).map_err(named)?;
+            (document, marks, report, grid)
         }
     };
     stages.end("fit");
-    Outgoing { document: &document, around: None, marks, control: None }.write(&plan.out)?;
+    let converged = report["converged"] != json!(false);
+    Outgoing { document: &document, around: None, marks, control: None, grid }.write(&plan.out)?;
     stages.end("write");
     report["seconds"] = stages.json();
     if let Some(path) = &plan.report {
         write_bytes(path, format!("{report:#}\n").as_bytes())?;
     }
-    Ok(Outcome::Done)
+    if converged {
+        return Ok(Outcome::Done);
+    }
+    tell("not converged: give fewer spans, a larger weight, or a stiffening above 0");
+    Ok(Outcome::Unfinished)
 }
 
 /// What there is to fit.
 enum Data {
-    /// Points along a curve.
-    Outline(Points),
-    /// Heights at places.
-    Scattered(Scatter),
+    /// Points along a curve, and where their y points.
+    Outline(Points, YAxis),
+    /// Heights at places, and the grid they are on.
+    Scattered(Scatter, Option<HeightField>),
 }
 
 fn bytes(path: &Path) -> Result<Vec<u8>, String> {
@@ -60,16 +68,16 @@ fn read(path: &Path) -> Result<Data, String> {
         Some(Format::Csv) => {
             let points = points::read_csv(&text()?)?;
             return match points.dim {
-                2 => Ok(Data::Outline(points)),
+                2 => Ok(Data::Outline(points, YAxis::Up)),
                 3 => {
                     let (at, values) = points.points.iter().map(|p| ([p[0], p[1]], p[2])).unzip();
-                    Scatter::new(at, values).map(Data::Scattered).map_err(|e| e.to_string())
+                    Scatter::new(at, values).map(|s| Data::Scattered(s, None)).map_err(|e| e.to_string())
                 }
                 _ => Err("one number a line: x,y is a curve, x,y,height a surface".to_owned()),
             };
         }
-        Some(Format::Dat) => return points::read_dat(&text()?).map(Data::Outline),
-        Some(Format::Svg) => return outline_of_svg(&text()?).map(Data::Outline),
+        Some(Format::Dat) => return points::read_dat(&text()?).map(|p| Data::Outline(p, YAxis::Up)),
+        Some(Format::Svg) => return outline_of_svg(&text()?),
         Some(Format::Npy) => height::read_npy(&bytes(path)?)?,
         Some(Format::Asc) => height::read_asc(&text()?)?,
         Some(Format::Png) => height::read_png(&bytes(path)?)?,
@@ -78,14 +86,15 @@ fn read(path: &Path) -> Result<Data, String> {
     // Rows along s, columns along t, a cell a unit.
     let width = field.shape[1];
     let known = (0..field.heights.len()).filter(|i| field.is_known(*i));
-    let place = |i: usize| [(i / width) as f64 * field.cell, (i % width) as f64 * field.cell];
+    let place = |i: usize| [(i / width) as f64 * field.cell[0], (i % width) as f64 * field.cell[1]];
     let (at, values) = known.map(|i| (place(i), field.heights[i])).unzip();
-    Scatter::new(at, values).map(Data::Scattered).map_err(|e| e.to_string())
+    Scatter::new(at, values).map(|s| Data::Scattered(s, Some(field))).map_err(|e| e.to_string())
 }
 
 /// Points on the first path of an SVG file, close enough to hold its shape.
-fn outline_of_svg(text: &str) -> Result<Points, String> {
-    let paths = svg::read(text)?.path.parts;
+fn outline_of_svg(text: &str) -> Result<Data, String> {
+    let picture = svg::read(text)?;
+    let paths = picture.path.parts;
     if paths.len() > 1 {
         return Err(format!("it has {} paths: an outline is one", paths.len()));
     }
@@ -94,7 +103,8 @@ fn outline_of_svg(text: &str) -> Result<Points, String> {
     let far = |p: &[f64; 3]| (p[0] - first[0]).hypot(p[1] - first[1]);
     let size = path.points().iter().map(far).fold(0.0, f64::max);
     let line = path.tessellate((1e-4 * size).max(1e-300)).map_err(|e| e.to_string())?;
-    Ok(Points { dim: 2, points: line.points })
+    let y = if picture.y_down { YAxis::Down } else { YAxis::Up };
+    Ok(Data::Outline(Points { dim: 2, points: line.points }, y))
 }
 
 type Fitted = (Document, Vec<Mark>, Value);
@@ -186,6 +196,7 @@ fn surface(plan: &FitPlan, scatter: &Scatter) -> Result<Fitted, String> {
     let report = json!({
         "points": count,
         "spans": [s.spans(), t.spans()],
+        "converged": fit.converged,
         "rms": fit.rms,
         "weight": fit.weight,
         "stiffening": fit.stiffening,
@@ -197,5 +208,8 @@ fn surface(plan: &FitPlan, scatter: &Scatter) -> Result<Fitted, String> {
     } else {
         Vec::new()
     };
-    Ok((Document { energy: [fit.stiffening.powi(2), 1.0, 0.0], ..Document::of_surface(surface) }, marks, report))
+    // Stiffening is per side of the domain.
+    let area: f64 = [s, t].map(|a| a.domain()[1] - a.domain()[0]).iter().product();
+    let energy = [fit.stiffening.powi(2) / area, 1.0, 0.0];
+    Ok((Document { energy, ..Document::of_surface(surface) }, marks, report))
 }

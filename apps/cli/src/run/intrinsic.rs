@@ -44,7 +44,7 @@ pub(super) fn run(
     stages.end("solve");
     document.geometry = Geometry::Curve(found.curve.clone());
     let marks = marks(&document, &constraints, coordinates);
-    Outgoing { document: &document, around: None, marks, control: None }.write(&plan.out)?;
+    Outgoing { document: &document, around: None, marks, control: None, grid: None }.write(&plan.out)?;
     stages.end("write");
     if let Some(path) = &plan.report {
         let report = json!({

@@ -11,6 +11,7 @@ pub(crate) mod probe;
 pub(crate) mod relight;
 mod shape_input;
 mod shape_output;
+mod stiffness;
 pub(crate) mod verify;
 
 use ondelette_io::ReadError;

@@ -43,7 +43,10 @@ pub(crate) fn read(path: &Path, part: Option<usize>) -> Result<Loaded, Refusal> 
             (Splines { curves: paths.path.parts, surfaces: Vec::new() }, y)
         }
         Some(Format::Step) => (step::read(&read_text(path)?).map_err(named)?, YAxis::Up),
-        Some(Format::Iges) => (iges::read(&read_text(path)?).map_err(named)?, YAxis::Up),
+        Some(Format::Iges) => {
+            let bytes = std::fs::read(path).map_err(|e| named(format!("cannot be read: {e}")))?;
+            (iges::read(bytes).map_err(named)?, YAxis::Up)
+        }
         _ => return Err(named("a shape to edit is .json, .svg, .step or .igs; fit points with ondelette fit".into())),
     };
     let (surfaces, curves) = (splines.surfaces.len(), splines.curves.len());

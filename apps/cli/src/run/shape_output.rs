@@ -21,6 +21,8 @@ pub(crate) struct Outgoing<'a> {
     pub(crate) marks: Vec<Mark>,
     /// Control points to be drawn with a curve; its own if left out.
     pub(crate) control: Option<Vec<[f64; 3]>>,
+    /// The height field that a surface was fitted to, with s and t from its first height: grids are written on it.
+    pub(crate) grid: Option<HeightField>,
 }
 
 /// Finest meshes of pictures.
@@ -60,7 +62,8 @@ impl Outgoing<'_> {
             (Format::Obj, Geometry::Surface(s)) => mesh::obj(&triangles(s, plan).map_err(named)?, &name).into_bytes(),
             (Format::Npy, Geometry::Surface(s)) => array(s).map_err(named)?,
             (Format::Asc, Geometry::Surface(s)) if s.dim() == 1 => {
-                height::write_asc(&heights(s).map_err(named)?).into_bytes()
+                let grid = self.grid.as_ref().map_or_else(|| heights(s), |grid| on_grid(s, grid));
+                height::write_asc(&grid.map_err(named)?).into_bytes()
             }
             (Format::Asc, _) => return Err(named("only height fields (one coordinate) are written as .asc".into())),
             _ => return Err(named("this kind of shape is not written as that".into())),
@@ -182,7 +185,26 @@ fn at_knots(surface: &Surface) -> ([usize; 2], Vec<[f64; 3]>) {
 fn heights(surface: &Surface) -> Result<HeightField, String> {
     let (shape, values) = at_knots(surface);
     let mut field = HeightField::new(shape, values.iter().map(|p| p[0]).collect())?;
-    field.cell = 1.0 / surface.axes()[0].density();
+    field.cell = surface.axes().map(|a| 1.0 / a.density());
+    if (field.cell[0] - field.cell[1]).abs() <= 1e-12 * field.cell[0] {
+        field.cell[1] = field.cell[0];
+    }
+    Ok(field)
+}
+
+/// Heights of a surface in the cells of a grid; those outside its domain are missing.
+fn on_grid(surface: &Surface, grid: &HeightField) -> Result<HeightField, String> {
+    let [rows, columns] = grid.shape;
+    let domain = surface.axes().map(|a| a.domain());
+    let place = |i: usize| [(i / columns) as f64 * grid.cell[0], (i % columns) as f64 * grid.cell[1]];
+    let inside = |p: [f64; 2]| (0..2).all(|a| (domain[a][0]..=domain[a][1]).contains(&p[a]));
+    let places = || (0..rows * columns).map(place);
+    let height = |p: [f64; 2]| if inside(p) { surface.point(p[0], p[1])[0] } else { 0.0 };
+    let mut field = HeightField::new(grid.shape, places().map(height).collect())?;
+    if !places().all(inside) {
+        field.known = places().map(inside).collect();
+    }
+    (field.cell, field.corner) = (grid.cell, grid.corner);
     Ok(field)
 }
 

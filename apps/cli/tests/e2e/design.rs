@@ -241,3 +241,46 @@ fn specifications_that_make_no_sense_are_refused_by_name() {
         assert!(ended.err.contains(said), "{arguments}: {}", ended.err);
     }
 }
+
+#[test]
+fn a_crease_of_no_width_counts_and_regions_that_count_for_nothing_are_refused() {
+    let place = Place::new();
+    let write = |region: &str, rest: &str| {
+        let rows = r#"{ "at": 0, "position": 0 }, { "at": 0.5, "position": 1 }, { "at": 1, "position": 0 }"#;
+        place.write("a.json", format!(r#"{{ "spans": 16, "constraints": [{rows}], "stiffness": [{region}] {rest} }}"#));
+    };
+    let energy = |region: &str| {
+        write(region, "");
+        place.run("curve a.json -o out.json --report r.json").with_code(0);
+        document(&place, "r.json")["energy"].as_f64().unwrap()
+    };
+    let plain = energy("");
+    for crease in [r#""from": 0.5, "to": 0.5"#, r#""from": 0.49, "to": 0.51"#, r#""from": 0.52, "to": 0.521"#] {
+        let creased = energy(&format!(r#"{{ {crease}, "factor": 1e-4 }}"#));
+        assert!(creased < 0.9 * plain, "{crease}: {creased} of {plain}");
+    }
+    for (region, word) in [
+        (r#"{ "from": 0.6, "to": 0.4, "factor": 2 }"#, "lower corner"),
+        (r#"{ "from": 1.5, "to": 2, "factor": 2 }"#, "outside the domain"),
+    ] {
+        write(region, "");
+        let ended = place.run("curve a.json -o out.json").with_code(2);
+        assert!(ended.err.contains("stiffness 0") && ended.err.contains(word), "{}", ended.err);
+    }
+    write(r#"{ "from": 0.9, "to": 1.1, "factor": 2 }"#, r#", "boundary": "periodic""#);
+    place.run("curve a.json -o out.json").with_code(0);
+}
+
+#[test]
+fn numbers_that_leave_nothing_to_compute_with_are_refused() {
+    let place = Place::new();
+    let rows = r#"{ "at": AT, "position": [0, 1] }, { "at": AT, "position": [1, 1], "weight": 1e-310 }"#;
+    for (domain, at, word) in [("[0, 1]", "0", "weight"), ("[1e16, 10000000000000032]", "1e16", "told apart")] {
+        let rows = rows.replace("AT", at);
+        place.write("a.json", format!(r#"{{ "spans": 64, "domain": {domain}, "constraints": [{rows}] }}"#));
+        for out in ["x.step", "x.igs", "x.svg", "x.json"] {
+            let ended = place.run(&format!("curve a.json -o {out}")).with_code(2);
+            assert!(ended.err.contains(word), "{}", ended.err);
+        }
+    }
+}

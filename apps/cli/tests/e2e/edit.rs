@@ -138,3 +138,11 @@ fn what_makes_no_sense_is_refused_before_anything_is_written() {
     let help = place.run("edit --help").with_code(0);
     assert!(help.out.contains("--pull") && help.out.contains("Examples:"));
 }
+
+#[test]
+fn a_pull_outside_the_domain_is_refused() {
+    let place = Place::new();
+    place.write("a.json", LINE);
+    let ended = place.run("edit a.json --pull 5 1,2 -o x.json").with_code(2);
+    assert!(ended.err.contains("outside the domain [0, 1]"), "{}", ended.err);
+}

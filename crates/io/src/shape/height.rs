@@ -14,8 +14,10 @@ pub struct HeightField {
     pub heights: Vec<f64>,
     /// Which heights are known; empty if all are.
     pub known: Vec<bool>,
-    /// Width of a cell, in the units of the file; 1 if it does not say.
-    pub cell: f64,
+    /// Height and width of a cell (rows and columns apart), in the units of the file; 1 if it does not say.
+    pub cell: [f64; 2],
+    /// Lower left corner of the last row's first cell (x, y), in the units of the file; 0 if it does not say.
+    pub corner: [f64; 2],
 }
 
 /// Most heights of a file.
@@ -37,7 +39,7 @@ impl HeightField {
         if let Some(i) = heights.iter().position(|h| !h.is_finite()) {
             return Err(format!("the height in row {}, column {} is {}", i / shape[1], i % shape[1], heights[i]));
         }
-        Ok(HeightField { shape, heights, known: Vec::new(), cell: 1.0 })
+        Ok(HeightField { shape, heights, known: Vec::new(), cell: [1.0; 2], corner: [0.0; 2] })
     }
 
     /// Whether a height is known.
@@ -87,13 +89,14 @@ pub fn write_npy(field: &HeightField) -> Vec<u8> {
     npy::write(&Grid { shape: field.shape.to_vec(), values })
 }
 
-/// Reads an ESRI ASCII grid.
+/// Reads an ESRI ASCII grid; cells that are not square have `dx` and `dy`, as GDAL writes them.
 ///
 /// # Errors
 /// A sentence: a header or a number that is none, another number of heights than it says.
 pub fn read_asc(text: &str) -> Result<HeightField, String> {
     let mut words = text.split_whitespace().peekable();
-    let (mut rows, mut columns, mut cell, mut gap) = (None, None, 1.0, -9999.0);
+    let (mut rows, mut columns, mut cell, mut gap) = (None, None, [1.0; 2], -9999.0);
+    let (mut corner, mut centred) = ([0.0; 2], [false; 2]);
     while let Some(name) = words.next_if(|w| w.starts_with(|c: char| c.is_ascii_alphabetic())) {
         let value = words.next().unwrap_or_default();
         let number = || value.parse::<f64>().map_err(|_| format!("{name} {value:?} is no number"));
@@ -101,17 +104,29 @@ pub fn read_asc(text: &str) -> Result<HeightField, String> {
         match name.to_ascii_lowercase().as_str() {
             "ncols" => columns = Some(count()?),
             "nrows" => rows = Some(count()?),
-            "cellsize" => cell = number()?,
+            "cellsize" => cell = [number()?; 2],
+            "dx" => cell[1] = number()?,
+            "dy" => cell[0] = number()?,
             "nodata_value" => gap = number()?,
-            "xllcorner" | "yllcorner" | "xllcenter" | "yllcenter" => _ = number()?,
+            name @ ("xllcorner" | "yllcorner" | "xllcenter" | "yllcenter") => {
+                let axis = usize::from(name.starts_with('y'));
+                (corner[axis], centred[axis]) = (number()?, name.ends_with("center"));
+            }
             _ => return Err(format!("{name:?} is no line of an ASCII grid's header")),
         }
     }
     let (Some(rows), Some(columns)) = (rows, columns) else {
         return Err("no ASCII grid: ncols and nrows are missing".to_owned());
     };
-    if !(cell > 0.0 && f64::is_finite(cell)) {
-        return Err(format!("the cell size is {cell}"));
+    if let Some(size) = cell.iter().find(|c| !(**c > 0.0 && c.is_finite())) {
+        return Err(format!("the cell size is {size}"));
+    }
+    // Rows are along y.
+    for axis in (0..2).filter(|a| centred[*a]) {
+        corner[axis] -= 0.5 * cell[1 - axis];
+    }
+    if let Some(place) = corner.iter().find(|c| !c.is_finite()) {
+        return Err(format!("the corner is at {place}"));
     }
     // the text is longer than the numbers it holds: nothing is reserved for those it only promises
     let heights = words
@@ -119,21 +134,20 @@ pub fn read_asc(text: &str) -> Result<HeightField, String> {
         .collect::<Result<Vec<f64>, String>>()?;
     let missing = |h: f64| h == gap || h.is_nan();
     let mut out = HeightField::with_gaps([rows, columns], heights, missing)?;
-    out.cell = cell;
+    (out.cell, out.corner) = (cell, corner);
     Ok(out)
 }
 
-/// An ESRI ASCII grid.
+/// An ESRI ASCII grid; `dx` and `dy` instead of `cellsize` where cells are not square.
 pub fn write_asc(field: &HeightField) -> String {
     let [rows, columns] = field.shape;
     let mut gap = -9999.0;
     while field.heights.contains(&gap) {
         gap = gap * 10.0 - 9.0;
     }
-    let mut out = format!(
-        "ncols {columns}\nnrows {rows}\nxllcorner 0\nyllcorner 0\ncellsize {}\nNODATA_value {gap}\n",
-        field.cell
-    );
+    let [[x, y], [dy, dx]] = [field.corner, field.cell];
+    let size = if dx == dy { format!("cellsize {dx}") } else { format!("dx {dx}\ndy {dy}") };
+    let mut out = format!("ncols {columns}\nnrows {rows}\nxllcorner {x}\nyllcorner {y}\n{size}\nNODATA_value {gap}\n");
     for (i, h) in field.heights.iter().enumerate() {
         // Writing to a String does not fail.
         let _ = write!(out, "{}", if field.is_known(i) { *h } else { gap });

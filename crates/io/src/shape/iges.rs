@@ -1,57 +1,32 @@
 //! IGES 5.3: entities 126 (rational B-spline curve) and 128 (rational B-spline surface).
 //!
-//! Lengths are taken as they stand; the files written say millimetres. Transformation matrices are not applied.
+//! Lengths are taken as they stand; the files written say millimetres.
 
 use super::{Splines, plane_if_flat};
 use ondelette_modeling::free::{FreeCurve, FreeSurface, Knots};
 use std::fmt::Write;
 
-/// Reads all entities 126 and 128 of an IGES file.
+/// Reads all entities 126 and 128 of an IGES file, moved by their transformation matrices; curves in the parameters of
+/// a surface (entity use 05) are left out. Bytes that are not ASCII (names in some encoding) hold their columns.
 ///
 /// # Errors
-/// A sentence: no IGES file, a broken entity (with its directory line), none of them.
-pub fn read(text: &str) -> Result<Splines, String> {
-    let mut global = String::new();
-    let mut directory: Vec<(usize, &str)> = Vec::new();
-    let mut parameters: Vec<&str> = Vec::new();
-    for (i, line) in text.lines().enumerate() {
-        let line = line.trim_end_matches('\r');
-        if line.len() < 73 {
+/// A sentence: no IGES file, a broken entity (with its directory line), one that uses a part of its knots only, none.
+pub fn read(file: impl AsRef<[u8]>) -> Result<Splines, String> {
+    let ascii = |b: &u8| if b.is_ascii() { char::from(*b) } else { '?' };
+    let text: String = file.as_ref().iter().map(ascii).collect();
+    let file = Sections::of(&text)?;
+    let mut out = Splines::default();
+    for (i, pair) in file.directory.chunks(2).enumerate() {
+        let Ok(kind @ (126 | 128)) = field(pair[0].1, 0) else { continue };
+        // Blanks stand for zeros.
+        let status = format!("{:0>8}", pair[0].1.get(64..72).unwrap_or_default().trim());
+        if status.get(4..6) == Some("05") {
             continue;
         }
-        let (Some(body), Some(section)) = (line.get(..72), line.get(72..73)) else {
-            return Err(format!("line {}: not plain text", i + 1));
-        };
-        match section {
-            "G" => global.push_str(body),
-            "D" => directory.push((i + 1, body)),
-            "P" => parameters.push(line.get(..64).unwrap_or_default()),
-            _ => {}
-        }
-    }
-    if directory.is_empty() || parameters.is_empty() {
-        return Err("no IGES file: directory or parameter section is missing".to_owned());
-    }
-    let (separator, end) = delimiters(&global);
-    let mut out = Splines::default();
-    for pair in directory.chunks(2) {
-        let (line, first) = pair[0];
-        let field = |body: &str, k: usize| body.get(8 * k..8 * k + 8).unwrap_or_default().trim().parse::<usize>();
-        let Ok(kind @ (126 | 128)) = field(first, 0) else { continue };
-        let named = |e: String| format!("line {line}, entity {kind}: {e}");
-        let second = pair.get(1).ok_or_else(|| named("its second line is missing".into()))?.1;
-        let (Ok(start), Ok(count)) = (field(first, 1), field(second, 3)) else {
-            return Err(named("it does not say where its parameters are".into()));
-        };
-        let lines = start.checked_sub(1).and_then(|s| parameters.get(s..s.checked_add(count)?));
-        let lines = lines.ok_or_else(|| named("its parameters are not in the file".into()))?;
-        let data = lines.concat();
-        let data = data.split(end).next().unwrap_or_default();
-        let numbers = data.split(separator).map(number).collect::<Result<Vec<f64>, String>>().map_err(named)?;
-        if numbers.first() != Some(&(kind as f64)) {
-            return Err(named("its parameters are those of another entity".into()));
-        }
-        let mut reader = Fields { numbers: &numbers, at: 1 };
+        let named = |e: String| format!("line {}, entity {kind}: {e}", pair[0].0);
+        let numbers = file.numbers(i).map_err(named)?;
+        let motion = file.motion(pair[0].1).map_err(named)?;
+        let mut reader = Fields { numbers: &numbers, at: 1, motion };
         match kind {
             126 => out.curves.push(reader.curve().map_err(named)?),
             _ => out.surfaces.push(reader.surface().map_err(named)?),
@@ -61,6 +36,98 @@ pub fn read(text: &str) -> Result<Splines, String> {
         return Err("the file holds no B-spline curve (126) or surface (128)".to_owned());
     }
     Ok(out)
+}
+
+/// A number of a directory line.
+fn field(body: &str, k: usize) -> Result<usize, String> {
+    let text = body.get(8 * k..8 * k + 8).unwrap_or_default().trim();
+    text.parse().map_err(|_| format!("its directory holds {text:?}, which is no count"))
+}
+
+/// A rotation (or any 3 x 3 matrix) and a shift, row by row.
+type Motion = [[f64; 4]; 3];
+
+/// Matrices that apply to each other, at most.
+const MOST_MOTIONS: usize = 16;
+
+/// The sections of a file that are read.
+struct Sections<'a> {
+    /// Line numbers and the first 72 columns; two lines an entity.
+    directory: Vec<(usize, &'a str)>,
+    parameters: Vec<&'a str>,
+    separator: char,
+    end: char,
+}
+
+impl Sections<'_> {
+    fn of(text: &str) -> Result<Sections<'_>, String> {
+        let mut global = String::new();
+        let (mut directory, mut parameters) = (Vec::new(), Vec::new());
+        for (i, line) in text.lines().enumerate() {
+            let (Some(body), Some(section)) = (line.get(..72), line.get(72..73)) else { continue };
+            match section {
+                "G" => global.push_str(body),
+                "D" => directory.push((i + 1, body)),
+                "P" => parameters.push(&body[..64]),
+                _ => {}
+            }
+        }
+        if directory.is_empty() || parameters.is_empty() {
+            return Err("no IGES file: directory or parameter section is missing".to_owned());
+        }
+        let (separator, end) = delimiters(&global);
+        Ok(Sections { directory, parameters, separator, end })
+    }
+
+    /// The parameters of an entity, its type first.
+    fn numbers(&self, entity: usize) -> Result<Vec<f64>, String> {
+        let first = self.directory.get(2 * entity).ok_or("it is not in the directory")?.1;
+        let second = self.directory.get(2 * entity + 1).ok_or("its second line is missing")?.1;
+        let (Ok(start), Ok(count)) = (field(first, 1), field(second, 3)) else {
+            return Err("it does not say where its parameters are".into());
+        };
+        let lines = start.checked_sub(1).and_then(|s| self.parameters.get(s..s.checked_add(count)?));
+        let data = lines.ok_or("its parameters are not in the file")?.concat();
+        let data = data.split(self.end).next().unwrap_or_default();
+        let numbers = data.split(self.separator).map(number).collect::<Result<Vec<f64>, String>>()?;
+        if numbers.first() != field(first, 0).ok().map(|kind| kind as f64).as_ref() {
+            return Err("its parameters are those of another entity".into());
+        }
+        Ok(numbers)
+    }
+
+    /// What the transformation matrices (124) of an entity do together; `None` without any.
+    fn motion(&self, directory: &str) -> Result<Option<Motion>, String> {
+        let pointer =
+            |body: &str| if body.get(48..56).unwrap_or_default().trim().is_empty() { Ok(0) } else { field(body, 6) };
+        let mut next = pointer(directory)?;
+        let mut motion: Option<Motion> = None;
+        for _ in 0..MOST_MOTIONS {
+            if next == 0 {
+                return Ok(motion);
+            }
+            if next % 2 == 0 {
+                return Err(format!("its transformation matrix is said to be at {next}, where no entity begins"));
+            }
+            let numbers = self.numbers(next / 2).map_err(|e| format!("its transformation matrix: {e}"))?;
+            let [124.0, m @ ..] = numbers.as_slice() else {
+                return Err(format!("directory entry {next} is no transformation matrix"));
+            };
+            let rows = m.get(..12).ok_or("its transformation matrix has fewer than 12 numbers")?;
+            let outer: Motion = std::array::from_fn(|i| std::array::from_fn(|k| rows[4 * i + k]));
+            motion = Some(match motion {
+                None => outer,
+                Some(inner) => std::array::from_fn(|i| {
+                    std::array::from_fn(|k| {
+                        let shift = if k == 3 { outer[i][3] } else { 0.0 };
+                        (0..3).map(|j| outer[i][j] * inner[j][k]).sum::<f64>() + shift
+                    })
+                }),
+            });
+            next = pointer(self.directory[next / 2 * 2].1)?;
+        }
+        Err(format!("more than {MOST_MOTIONS} transformation matrices apply to it"))
+    }
 }
 
 /// Parameter and record delimiter: the first two global parameters, `1H,` and `1H;` if left out.
@@ -93,6 +160,7 @@ fn number(text: &str) -> Result<f64, String> {
 struct Fields<'a> {
     numbers: &'a [f64],
     at: usize,
+    motion: Option<Motion>,
 }
 
 impl Fields<'_> {
@@ -114,8 +182,13 @@ impl Fields<'_> {
     }
 
     fn points(&mut self, n: usize) -> Result<Vec<[f64; 3]>, String> {
+        let motion = self.motion;
         let flat = self.take(n.saturating_mul(3))?;
-        Ok(flat.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect())
+        let moved = |p: &[f64]| match motion {
+            None => [p[0], p[1], p[2]],
+            Some(m) => m.map(|row| row[0] * p[0] + row[1] * p[1] + row[2] * p[2] + row[3]),
+        };
+        Ok(flat.chunks_exact(3).map(moved).collect())
     }
 
     fn curve(&mut self) -> Result<FreeCurve, String> {
@@ -140,16 +213,19 @@ impl Fields<'_> {
         // the first direction runs fastest
         let weights = self.take(total)?.to_vec();
         let points = self.points(total)?;
+        let ends = self.take(4).map(|e| [[e[0], e[1]], [e[2], e[3]]]);
         let turned = |i: usize| (i % (k2 + 1)) * (k1 + 1) + i / (k2 + 1);
         let weights = (0..total).map(|i| weights[turned(i)]).collect();
         let points = (0..total).map(|i| points[turned(i)]).collect();
         let u = Knots::new(m1, u, k1 + 1).map_err(|e| e.to_string())?;
         let v = Knots::new(m2, v, k2 + 1).map_err(|e| e.to_string())?;
+        whole(u.domain(), ends.clone().map(|e| e[0]))?;
+        whole(v.domain(), ends.map(|e| e[1]))?;
         FreeSurface::new([u, v], points, Some(weights)).map_err(|e| e.to_string())
     }
 }
 
-/// Curves that use a part of their knots only would need a split, which is not done silently.
+/// Splines that use a part of their knots only would need a split, which is not done silently.
 fn whole(domain: [f64; 2], ends: Result<[f64; 2], String>) -> Result<(), String> {
     let Ok([a, b]) = ends else { return Ok(()) };
     let slack = 1e-9 * (domain[1] - domain[0]);

@@ -163,10 +163,8 @@ fn list<T>(items: &[T], f: impl Fn(&T) -> String) -> String {
 
 /// Different knots and how often each appears.
 fn grouped(knots: &Knots) -> (String, String) {
-    let mut values: Vec<f64> = knots.values().to_vec();
-    values.dedup();
-    let times = |v: &f64| knots.values().iter().filter(|k| *k == v).count().to_string();
-    (list(&values, times), list(&values, |v| real(*v)))
+    let runs: Vec<&[f64]> = knots.values().chunk_by(|a, b| a == b).collect();
+    (list(&runs, |run| run.len().to_string()), list(&runs, |run| real(run[0])))
 }
 
 /// Writes curves and surfaces as a STEP file (AP214): a geometric set in millimetres. Numbers read back to the bit.

@@ -65,7 +65,7 @@ fn what_is_written_reads_back_to_the_bit() {
     let all = everything();
     let back = step::read(&step::write(&all, "all kinds").unwrap()).unwrap();
     assert_eq!(back, all);
-    let back = iges::read(&iges::write(&all, "all kinds").unwrap()).unwrap();
+    let back = iges::read(iges::write(&all, "all kinds").unwrap()).unwrap();
     assert_eq!(back, all);
     for line in iges::write(&all, "x").unwrap().lines() {
         assert_eq!(line.len(), 80, "{line}");
@@ -123,4 +123,79 @@ fn broken_files_say_where() {
     assert!(iges::read(&cut).unwrap_err().contains("128"));
     let trimmed = iges::write(&Splines { surfaces: Vec::new(), ..everything() }, "x").unwrap();
     assert!(iges::read(&trimmed).is_ok());
+}
+
+/// An IGES file of entities: type, number of the matrix's entity, entity use flag, parameters.
+fn entities(all: &[(u32, usize, &str, &str)]) -> String {
+    let (mut directory, mut parameters) = (String::new(), String::new());
+    let mut next = 1;
+    for (i, (kind, matrix, usage, fields)) in all.iter().enumerate() {
+        let d = 2 * i + 1;
+        let matrix = if *matrix == 0 { 0 } else { 2 * matrix - 1 };
+        let data = format!("{kind},{fields};");
+        let lines: Vec<&str> = data.split_inclusive(',').collect();
+        directory += &format!(
+            "{kind:>8}{next:>8}{0:>8}{0:>8}{0:>8}{0:>8}{matrix:>8}{0:>8}{status:>8}D{d:>7}\n",
+            0,
+            status = format!("0000{usage}00"),
+        );
+        let count = lines.len();
+        directory += &format!("{kind:>8}{0:>8}{0:>8}{count:>8}{0:>8}{0:>8}{0:>8}{0:>8}{0:>8}D{1:>7}\n", 0, d + 1);
+        for line in lines {
+            parameters += &format!("{line:<64}{d:>8}P{next:>7}\n");
+            next += 1;
+        }
+    }
+    format!("{:<72}S      1\n{:<72}G      1\n{directory}{parameters}", "", "1H,,1H;")
+}
+
+const SEGMENT: &str = "1,1,0,0,1,0,0.,0.,1.,1.,1.,1.,0.,0.,0.,2.,0.,0.,0.,1.,0.,0.,0.";
+
+#[test]
+fn iges_matrices_move_what_they_belong_to_one_after_the_other() {
+    // A quarter turn about z with a shift along x, then twice as large and up.
+    let turn = "0.,-1.,0.,10.,1.,0.,0.,0.,0.,0.,1.,0.";
+    let grow = "2.,0.,0.,0.,0.,2.,0.,0.,0.,0.,2.,5.";
+    let plain = iges::read(entities(&[(126, 0, "00", SEGMENT)])).unwrap();
+    assert_eq!(plain.curves[0].points(), [[0.0; 3], [2.0, 0.0, 0.0]]);
+    let moved = iges::read(entities(&[(124, 2, "00", turn), (124, 0, "00", grow), (126, 1, "00", SEGMENT)])).unwrap();
+    assert_eq!(moved.curves[0].points(), [[20.0, 0.0, 5.0], [20.0, 4.0, 5.0]]);
+    // A matrix that is none, that is of itself, that is not there.
+    for wrong in [
+        entities(&[(110, 0, "00", "0.,0.,0.,1.,1.,1."), (126, 1, "00", SEGMENT)]),
+        entities(&[(124, 1, "00", turn), (126, 1, "00", SEGMENT)]),
+        entities(&[(126, 7, "00", SEGMENT)]),
+        entities(&[(124, 0, "00", "1.,0.,0."), (126, 1, "00", SEGMENT)]),
+    ] {
+        assert!(iges::read(&wrong).unwrap_err().contains("entity 126"), "{wrong}");
+    }
+}
+
+#[test]
+fn iges_curves_of_parameters_are_left_out_and_parts_of_surfaces_refused() {
+    let both = iges::read(entities(&[(126, 0, "05", SEGMENT), (126, 0, "00", SEGMENT)])).unwrap();
+    assert_eq!(both.curves.len(), 1, "a curve in the parameters of a surface is none in space");
+    let sheet = |ends: &str| {
+        let points = "0.,0.,0.,1.,0.,0.,0.,1.,0.,1.,1.,0.";
+        format!("1,1,1,1,0,0,1,0,0,0.,0.,1.,1.,0.,0.,1.,1.,1.,1.,1.,1.,{points},{ends}")
+    };
+    assert!(iges::read(entities(&[(128, 0, "00", &sheet("0.,1.,0.,1."))])).is_ok());
+    for ends in ["0.,0.5,0.,1.", "0.,1.,0.25,1."] {
+        let refused = iges::read(entities(&[(128, 0, "00", &sheet(ends))])).unwrap_err();
+        assert!(refused.contains("trimmed"), "{refused}");
+    }
+}
+
+#[test]
+fn iges_columns_hold_whatever_bytes_a_name_has() {
+    let text = entities(&[(126, 0, "00", SEGMENT)]);
+    let name = text.find("1H,,1H;").unwrap() + 20;
+    let mut bytes = text.clone().into_bytes();
+    bytes[name] = 0xe9;
+    assert_eq!(iges::read(&bytes).unwrap(), iges::read(&text).unwrap());
+    // Behind a parameter list's end, in a line that counts.
+    let end = text.rfind("0.;").unwrap() + 5;
+    let mut bytes = text.clone().into_bytes();
+    bytes[end..end + 2].copy_from_slice("\u{e9}".as_bytes());
+    assert_eq!(iges::read(&bytes).unwrap(), iges::read(&text).unwrap());
 }

@@ -139,5 +139,17 @@ fn height_fields_come_back() {
     {
         assert!(height::read_asc(text).is_err(), "{text}");
     }
+    // Where it lies and how large its cells are comes back, square or not.
+    (field.cell, field.corner) = ([30.0, 30.0], [746_000.5, 4_022_000.25]);
+    assert!(height::write_asc(&field).contains("xllcorner 746000.5\nyllcorner 4022000.25\ncellsize 30\n"));
+    assert_eq!(height::read_asc(&height::write_asc(&field)).unwrap(), field);
+    field.cell = [10.5, 30.0];
+    assert!(height::write_asc(&field).contains("dx 30\ndy 10.5\n"));
+    assert_eq!(height::read_asc(&height::write_asc(&field)).unwrap(), field);
+    let centred = "ncols 1\nnrows 1\nxllcenter 20\nyllcenter 7\ndx 4\ndy 2\n5\n";
+    assert_eq!(height::read_asc(centred).unwrap().corner, [18.0, 6.0]);
+    for text in ["ncols 1\nnrows 1\ndx 0\n5", "ncols 1\nnrows 1\nxllcorner inf\n5"] {
+        assert!(height::read_asc(text).is_err(), "{text}");
+    }
     assert!(height::read_png(b"no picture").is_err());
 }

@@ -7,7 +7,8 @@
 
 use crate::constraint::{Constraint, Demand};
 use crate::solve::{Settings, SolveError, Solver};
-use crate::system::Problem;
+use crate::system::{Problem, ProblemError};
+use std::collections::BTreeSet;
 
 /// A solved shape whose constraints can be dragged.
 ///
@@ -36,17 +37,22 @@ pub struct Handles {
     columns: Vec<Column>,
     budget: usize,
     saved: Vec<(Problem, Vec<Vec<f64>>)>,
+    /// Constraints that share redundant rows: their targets are checked at every move.
+    tied: BTreeSet<String>,
 }
+
+/// Coordinate and coefficients, one a coordinate that answers.
+type Response = Vec<(usize, Vec<f64>)>;
 
 struct Column {
     id: String,
-    /// Responses, part by part: coordinate and coefficients.
-    parts: Vec<Vec<(usize, Vec<f64>)>>,
+    /// The answer to each coordinate's target; `None` where it is free or redundant.
+    parts: Vec<Option<Response>>,
 }
 
 impl Column {
     fn bytes(&self) -> usize {
-        self.parts.iter().flatten().map(|p| 8 * p.1.len()).sum()
+        self.parts.iter().flatten().flatten().map(|p| 8 * p.1.len()).sum()
     }
 }
 
@@ -57,7 +63,9 @@ pub enum DragError {
     #[error("no constraint is called {0}")]
     Name(String),
     /// A constraint without linear targets, or one that follows from others.
-    #[error("constraint {0} has no target to drag: it is redundant, a normal or an image, or a curvature is set")]
+    #[error(
+        "constraint {0} has no target to drag: it follows from others, is a normal or an image, or a curvature is set"
+    )]
     Fixed(String),
     /// Targets of another shape.
     #[error("constraint {0}: give as many targets as it has coordinates, free ones as before, all finite")]
@@ -74,7 +82,8 @@ impl Handles {
     /// [`SolveError`].
     pub fn new(problem: Problem, settings: Settings, budget: usize) -> Result<Handles, SolveError> {
         let (solver, coefficients) = cold(&problem, settings)?;
-        Ok(Handles { problem, settings, solver, coefficients, columns: Vec::new(), budget, saved: Vec::new() })
+        let tied = tied(&problem).map_err(SolveError::Problem)?;
+        Ok(Handles { problem, settings, solver, coefficients, columns: Vec::new(), budget, saved: Vec::new(), tied })
     }
 
     /// The coefficients, coordinate by coordinate.
@@ -102,13 +111,11 @@ impl Handles {
             return Ok(());
         }
         let targets = self.targets(id)?;
-        let count = targets.iter().flatten().count();
-        let mut parts = Vec::with_capacity(count);
-        for part in 0..count {
-            let response = self.solver.response(id, part)?;
-            parts.push(response.ok_or_else(|| DragError::Fixed(id.to_owned()))?);
+        let mut parts = Vec::with_capacity(targets.len());
+        for (coordinate, target) in targets.iter().enumerate() {
+            parts.push(if target.is_some() { self.solver.response(id, coordinate)? } else { None });
         }
-        if parts.is_empty() {
+        if parts.iter().all(Option::is_none) {
             return Err(DragError::Fixed(id.to_owned()));
         }
         self.columns.push(Column { id: id.to_owned(), parts });
@@ -118,7 +125,8 @@ impl Handles {
         Ok(())
     }
 
-    /// Moves the target of a constraint: one vector addition a coordinate.
+    /// Moves the target of a constraint: one vector addition a coordinate. Where other constraints follow from it (a
+    /// second one at the same place), their targets must still be met, which costs a search for them a move.
     ///
     /// # Errors
     /// [`DragError`]; nothing has changed then.
@@ -131,13 +139,10 @@ impl Handles {
         }
         self.grab(id)?;
         let Some(column) = self.columns.iter().find(|c| c.id == id) else { return Ok(()) };
-        let moves = from.iter().zip(to).filter_map(|(a, b)| Some((*b)? - (*a)?));
-        for (by, part) in moves.zip(&column.parts) {
-            if by != 0.0 {
-                for (coordinate, response) in part {
-                    self.coefficients[*coordinate].iter_mut().zip(response).for_each(|(x, r)| *x += by * r);
-                }
-            }
+        let moves = from.iter().zip(to).map(|(a, b)| b.unwrap_or(0.0) - a.unwrap_or(0.0));
+        let moves: Vec<(f64, &Option<Response>)> = moves.zip(&column.parts).filter(|m| m.0 != 0.0).collect();
+        if moves.iter().any(|m| m.1.is_none()) {
+            return Err(DragError::Fixed(id.to_owned()));
         }
         let constraints = self.problem.constraints().iter().map(|c| {
             let mut c = c.clone();
@@ -149,7 +154,16 @@ impl Handles {
             }
             c
         });
-        self.problem = self.posed(constraints.collect())?;
+        let problem = self.posed(constraints.collect())?;
+        if self.tied.contains(id) {
+            problem.blocks(problem.rows()).map_err(SolveError::Problem)?;
+        }
+        for (by, part) in moves {
+            for (coordinate, response) in part.iter().flatten() {
+                self.coefficients[*coordinate].iter_mut().zip(response).for_each(|(x, r)| *x += by * r);
+            }
+        }
+        self.problem = problem;
         Ok(())
     }
 
@@ -185,10 +199,12 @@ impl Handles {
     /// [`DragError::Solve`] if the factors of the saved constraints cannot be made again.
     pub fn undo(&mut self) -> Result<bool, DragError> {
         let Some((problem, coefficients)) = self.saved.pop() else { return Ok(false) };
-        let ids = |p: &Problem| p.constraints().iter().map(|c| c.id.clone()).collect::<Vec<_>>();
-        if ids(&problem) != ids(&self.problem) {
+        let (old, new) = (self.problem.constraints(), problem.constraints());
+        if old.len() != new.len() || !old.iter().zip(new).all(|(a, b)| differ_in_targets_only(a, b)) {
+            let tied = tied(&problem).map_err(SolveError::Problem)?;
             self.solver = Solver::new(problem.clone(), self.settings)?;
             self.columns.clear();
+            self.tied = tied;
         }
         self.problem = problem;
         self.coefficients = coefficients;
@@ -210,9 +226,11 @@ impl Handles {
 
     fn replace(&mut self, constraints: Vec<Constraint>) -> Result<(), DragError> {
         let problem = self.posed(constraints)?;
+        let tied = tied(&problem).map_err(SolveError::Problem)?;
         (self.solver, self.coefficients) = cold(&problem, self.settings)?;
         self.problem = problem;
         self.columns.clear();
+        self.tied = tied;
         Ok(())
     }
 }
@@ -222,4 +240,23 @@ fn cold(problem: &Problem, settings: Settings) -> Result<(Solver, Vec<Vec<f64>>)
     solver.finish()?;
     let coefficients = solver.coefficients();
     Ok((solver, coefficients))
+}
+
+/// True where factors and columns of one serve the other: the same place, weight and kind of demand, with the same
+/// coordinates left free.
+fn differ_in_targets_only(a: &Constraint, b: &Constraint) -> bool {
+    let free = |v: &[Option<f64>], w: &[Option<f64>]| v.iter().map(Option::is_some).eq(w.iter().map(Option::is_some));
+    let demands = match (&a.demand, &b.demand) {
+        (Demand::Position(v), Demand::Position(w)) => free(v, w),
+        (Demand::Derivative(i, v), Demand::Derivative(k, w)) => i == k && free(v, w),
+        (v, w) => v == w,
+    };
+    demands && a.id == b.id && a.at == b.at && a.weight == b.weight
+}
+
+/// Constraints that take part in redundant rows, by name.
+fn tied(problem: &Problem) -> Result<BTreeSet<String>, ProblemError> {
+    let (_, redundant) = problem.blocks(problem.rows())?;
+    let all = redundant.iter().flat_map(|r| r.others.iter().copied().chain([r.constraint]));
+    Ok(all.map(|c| problem.constraints()[c].id.clone()).collect())
 }

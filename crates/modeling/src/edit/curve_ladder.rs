@@ -3,6 +3,7 @@
 use super::axis_ladder::{AxisLadder, levels_of};
 use super::ladder::{EditError, Ladder};
 use super::orientation::Turn;
+use crate::axis::Axis;
 use crate::shape::{Curve, ParametricCurve};
 use ondelette_wavelet::{Frame, Hybrid};
 
@@ -65,6 +66,10 @@ impl CurveLadder {
 
 impl Ladder for CurveLadder {
     type Shape = Curve;
+
+    fn axes(&self) -> Vec<Axis> {
+        vec![self.axis.axis]
+    }
 
     fn levels(&self) -> usize {
         self.axis.pyramid().levels()

@@ -1,6 +1,7 @@
 //! What an editor needs of a shape on all its levels.
 
 use super::orientation::Turn;
+use crate::axis::Axis;
 use crate::shape::ShapeError;
 use ondelette_wavelet::{PyramidError, TransformError};
 
@@ -42,6 +43,18 @@ pub enum EditError {
         /// What it is.
         value: f64,
     },
+    /// A pull outside the domain.
+    #[error("pull {pull}: parameter {value} is outside the domain [{from}, {to}]")]
+    Outside {
+        /// Index of the pull.
+        pull: usize,
+        /// The parameter.
+        value: f64,
+        /// Start of the domain.
+        from: f64,
+        /// End of the domain.
+        to: f64,
+    },
     /// Pulls that cannot hold together.
     #[error(
         "pull {pull} contradicts those before it: the functions of this level that reach it are already held \
@@ -73,6 +86,9 @@ pub enum EditError {
 pub trait Ladder: Clone {
     /// What the ladder is of.
     type Shape;
+
+    /// The axes of the finest level: one, or those of s and t.
+    fn axes(&self) -> Vec<Axis>;
 
     /// The finest level.
     fn levels(&self) -> usize;

@@ -9,7 +9,7 @@ use crate::axis::Axis;
 use crate::basis;
 use crate::shape::{Curve, Surface};
 use crate::system::sparse_dot;
-use ondelette_wavelet::{Kind, energy_diagonals, gram};
+use ondelette_wavelet::{Boundary, Kind, energy_diagonals, gram};
 
 /// One wish: the shape, or a derivative of it, at a parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,9 +49,10 @@ type Factors = [Vec<(usize, f64)>; 2];
 /// ```
 ///
 /// # Errors
-/// No such level; numbers that are not finite; [`EditError::Conflict`]. Nothing changes then.
+/// No such level; numbers that are not finite; parameters outside the domain; [`EditError::Conflict`]. Nothing
+/// changes then.
 pub fn least_squares<L: Ladder>(editor: &mut Editor<L>, level: usize, pulls: &[Pull]) -> Result<Pulled, EditError> {
-    check(pulls)?;
+    check(pulls, &editor.ladder().axes())?;
     let mut points = editor.control(level)?.to_vec();
     let levels = editor.levels();
     editor.control(levels)?;
@@ -66,9 +67,16 @@ pub fn least_squares<L: Ladder>(editor: &mut Editor<L>, level: usize, pulls: &[P
     Ok(pulled)
 }
 
-fn check(pulls: &[Pull]) -> Result<(), EditError> {
-    for p in pulls {
+fn check(pulls: &[Pull], axes: &[Axis]) -> Result<(), EditError> {
+    for (pull, p) in pulls.iter().enumerate() {
         finite("a parameter of a pull", &p.at)?;
+        for (&value, axis) in p.at.iter().zip(axes).filter(|e| e.1.boundary() != Boundary::Periodic) {
+            let [from, to] = axis.domain();
+            let slack = 1e-12 * (to - from);
+            if !(from - slack..=to + slack).contains(&value) {
+                return Err(EditError::Outside { pull, value, from, to });
+            }
+        }
         for x in p.target.into_iter().flatten() {
             finite("the target of a pull", &[x])?;
         }
@@ -220,7 +228,7 @@ fn coarse(axis: &Axis, times: usize) -> Result<Axis, EditError> {
 /// # Errors
 /// Spans that cannot be halved as often; otherwise as [`least_squares`].
 pub fn delta_curve(curve: &Curve, times: usize, pulls: &[Pull]) -> Result<(Curve, Pulled), EditError> {
-    check(pulls)?;
+    check(pulls, &[*curve.axis()])?;
     let axis = coarse(curve.axis(), times)?;
     let mut change = vec![[0.0; 3]; axis.len()];
     let now: Vec<_> = pulls.iter().map(|p| curve.derivative(p.at[0], p.orders[0])).collect();
@@ -236,7 +244,7 @@ pub fn delta_curve(curve: &Curve, times: usize, pulls: &[Pull]) -> Result<(Curve
 /// # Errors
 /// As [`delta_curve`].
 pub fn delta_surface(surface: &Surface, times: [usize; 2], pulls: &[Pull]) -> Result<(Surface, Pulled), EditError> {
-    check(pulls)?;
+    check(pulls, surface.axes())?;
     let axes = [coarse(&surface.axes()[0], times[0])?, coarse(&surface.axes()[1], times[1])?];
     let width = axes[1].len();
     let mut change = vec![[0.0; 3]; axes[0].len() * width];
@@ -268,7 +276,7 @@ fn row(axis: &Axis, t: f64, order: usize) -> Vec<(usize, f64)> {
 /// # Errors
 /// As [`least_squares`].
 pub fn pentland(curve: &Curve, pulls: &[Pull]) -> Result<(Curve, Pulled), EditError> {
-    check(pulls)?;
+    check(pulls, &[*curve.axis()])?;
     let ladder = CurveLadder::new(curve)?;
     let pyramid = ladder.axis().pyramid();
     let energy = gram::energy(pyramid, 2).unwrap_or_else(|| gram::mass(pyramid));

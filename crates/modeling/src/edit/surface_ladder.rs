@@ -3,6 +3,7 @@
 use super::axis_ladder::{AxisLadder, levels_of};
 use super::ladder::{EditError, Ladder};
 use super::orientation::Turn;
+use crate::axis::Axis;
 use crate::shape::Surface;
 use ondelette_wavelet::{Kind, Rung};
 
@@ -78,6 +79,10 @@ fn transposed(net: &[[f64; 3]], width: usize) -> Vec<[f64; 3]> {
 
 impl Ladder for SurfaceLadder {
     type Shape = Surface;
+
+    fn axes(&self) -> Vec<Axis> {
+        self.axes.iter().map(|a| a.axis).collect()
+    }
 
     fn levels(&self) -> usize {
         self.detail.len()

@@ -33,7 +33,9 @@ pub(super) fn search(
                 }
                 loop {
                     let next = [at[0] + a * step[0], at[1] + b * step[1]];
-                    if !(-16.0..=2.0).contains(&next[0]) || !(-1.0..=2.5).contains(&next[1]) {
+                    // What is given may lie anywhere.
+                    let outside = [!(-16.0..=2.0).contains(&next[0]), !(-1.0..=2.5).contains(&next[1])];
+                    if free[0] && outside[0] || free[1] && outside[1] {
                         break;
                     }
                     let got = value(next)?;

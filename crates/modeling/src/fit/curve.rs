@@ -4,6 +4,7 @@
 //! by the banded solver. Weight and stiffening are chosen by cross-validation unless given, as of surfaces.
 
 use super::choose::{BEGIN, STEPS, search};
+use super::surface::LARGEST;
 use super::{FitError, FitSettings};
 use crate::axis::Axis;
 use crate::constraint::{Constraint, Demand};
@@ -81,6 +82,9 @@ pub fn curve(points: &[Vec<f64>], closed: bool, settings: FitSettings) -> Result
     let wrong = FitError::Outline(m);
     if m < 4 || !(2..=3).contains(&k) || points.iter().any(|p| p.len() != k || p.iter().any(|v| !v.is_finite())) {
         return Err(wrong);
+    }
+    if let Some(value) = points.iter().flatten().find(|v| v.abs() > LARGEST) {
+        return Err(FitError::Large(*value));
     }
     for (name, given) in [("weight", settings.weight), ("stiffening", settings.stiffening)] {
         if let Some(value) = given

@@ -34,6 +34,14 @@ pub enum FairError {
     /// No such tolerance.
     #[error("tolerance {0}: give a distance above 0")]
     Tolerance(f64),
+    /// Points closer together than the curve can follow, or a tolerance below the rounding of the points.
+    #[error("tolerance {tolerance:e} cannot be reached: the curve passes a point by {nearest:.1e} at best")]
+    Unreachable {
+        /// The tolerance asked for.
+        tolerance: f64,
+        /// The largest distance that is left.
+        nearest: f64,
+    },
     /// The inner solver failed.
     #[error(transparent)]
     Solve(#[from] SolveError),
@@ -91,21 +99,30 @@ pub fn fair(points: &[Vec<f64>], tolerance: f64) -> Result<Fair, FairError> {
     let mut best: Option<(f64, Solution)> = None;
     let mut middle = 4.0_f64;
     let mut map = None;
+    let mut nearest = f64::INFINITY;
     for round in 0..ROUNDS {
         // The least common weight that keeps all points within the tolerance.
         let (mut low, mut high) = if round < 2 { (-6.0, 16.0) } else { (middle - 2.0, middle + 2.0) };
         let mut found = None;
-        for _ in 0..if round < 2 { 24 } else { 14 } {
-            let w = 0.5 * (low + high);
-            let weights: Vec<f64> = shares.iter().map(|s| s * 10.0_f64.powf(w)).collect();
-            let curve = solve(&weights, &map)?;
-            let m = moves(&curve);
-            if most(&m) <= tolerance {
-                high = w;
-                found = Some((curve, m));
-            } else {
-                low = w;
+        loop {
+            let end = high;
+            for _ in 0..if round < 2 { 24 } else { 14 } {
+                let w = 0.5 * (low + high);
+                let weights: Vec<f64> = shares.iter().map(|s| s * 10.0_f64.powf(w)).collect();
+                let curve = solve(&weights, &map)?;
+                let m = moves(&curve);
+                nearest = nearest.min(most(&m));
+                if most(&m) <= tolerance {
+                    high = w;
+                    found = Some((curve, m));
+                } else {
+                    low = w;
+                }
             }
+            if found.is_some() || round >= 2 || end >= MOST_WEIGHT {
+                break;
+            }
+            (low, high) = (end, end + 4.0);
         }
         middle = high;
         let Some((curve, m)) = found else { break };
@@ -122,7 +139,7 @@ pub fn fair(points: &[Vec<f64>], tolerance: f64) -> Result<Fair, FairError> {
             *s = (*s * (0.05 + m / tolerance)).clamp(1e-9, 1e9);
         }
     }
-    let Some((_, curve)) = best else { return Err(FairError::Tolerance(tolerance)) };
+    let Some((_, curve)) = best else { return Err(FairError::Unreachable { tolerance, nearest }) };
     let largest_move = most(&moves(&curve));
     let moved = parameters.iter().map(|t| curve.eval(&[*t], [0, 0])).collect();
     Ok(Fair { curve, parameters, points: moved, largest_move })
@@ -130,6 +147,8 @@ pub fn fair(points: &[Vec<f64>], tolerance: f64) -> Result<Fair, FairError> {
 
 /// Rounds of new shares.
 const ROUNDS: usize = 16;
+/// Logarithm of the largest common weight: more moves no point closer.
+const MOST_WEIGHT: f64 = 32.0;
 
 /// Stiffness that falls where a curve is bent more than usual.
 fn softened(curve: &Solution, spans: usize) -> Option<Stiffness> {

@@ -9,7 +9,7 @@ use super::normal::Normal;
 use crate::axis::{Axis, AxisError};
 use crate::basis;
 use crate::energy::{Energy, EnergyError, Operator};
-use crate::solve::cycle::Cycle;
+use crate::solve::cycle::{Cycle, coarser};
 use crate::system::Space;
 use ondelette_numerics::seed;
 use ondelette_wavelet::Boundary;
@@ -29,7 +29,8 @@ pub struct FitSettings {
     pub weight: Option<f64>,
     /// Square root of stretch over bend, per side of the domain; `None`: by cross-validation.
     pub stiffening: Option<f64>,
-    /// Spans an axis; `None`: the power of two above twice the square root of the number of points, at most 512.
+    /// Spans an axis; `None`: the power of two above twice the square root of the number of points, 8 to 512, and where
+    /// one side of the domain is longer than the other as many more on it as there are fewer on the other.
     pub spans: Option<usize>,
     /// The domain `[[s0, s1], [t0, t1]]`; `None`: the bounding box of the points.
     pub domain: Option<[[f64; 2]; 2]>,
@@ -50,6 +51,8 @@ pub struct Fit {
     pub rms: f64,
     /// Root mean square of predictions of left-out points, if any were left out.
     pub validation: Option<f64>,
+    /// False where the iteration ended before it reached its tolerance.
+    pub converged: bool,
 }
 
 /// Why nothing can be fitted.
@@ -66,6 +69,9 @@ pub enum FitError {
     /// A number that is NaN or infinite.
     #[error("point {0} is not finite: leave it out (missing data need no stand-in)")]
     NotFinite(usize),
+    /// A height or coordinate whose square is no number.
+    #[error("a value of {0:e} is too large: squares are summed, so scale the data to below 1e100")]
+    Large(f64),
     /// A point outside the domain.
     #[error("point {0} is outside the domain")]
     Outside(usize),
@@ -141,16 +147,19 @@ pub fn surface(data: &Scatter, settings: FitSettings) -> Result<Fit, FitError> {
         };
         [range(0), range(1)]
     });
-    let spans =
-        settings.spans.unwrap_or_else(|| ((2.0 * (m as f64).sqrt()) as usize).next_power_of_two().clamp(8, 512));
-    if !(spans.is_power_of_two() && (4..=1024).contains(&spans)) {
-        return Err(FitError::Spans(spans));
+    if let Some(value) = data.values.iter().find(|v| v.abs() > LARGEST) {
+        return Err(FitError::Large(*value));
     }
+    let spans = match settings.spans {
+        Some(spans) if spans.is_power_of_two() && (4..=1024).contains(&spans) => [spans; 2],
+        Some(spans) => return Err(FitError::Spans(spans)),
+        None => spans_for(m, domain.map(|[low, high]| high - low)),
+    };
     let inside = |p: &[f64; 2]| (0..2).all(|a| (domain[a][0]..=domain[a][1]).contains(&p[a]));
     if let Some(i) = data.points.iter().position(|p| !inside(p)) {
         return Err(FitError::Outside(i));
     }
-    let axis = |a: usize| Axis::new(Boundary::Open, spans, domain[a]);
+    let axis = |a: usize| Axis::new(Boundary::Open, spans[a], domain[a]);
     let space = Space::surface(axis(0)?, axis(1)?);
     for (name, given) in [("weight", settings.weight), ("stiffening", settings.stiffening)] {
         if let Some(value) = given
@@ -171,7 +180,7 @@ pub fn surface(data: &Scatter, settings: FitSettings) -> Result<Fit, FitError> {
         let mut parts = Part::windows(&space, &data.points, &centred, side)?;
         let (mut begin, mut steps) = (BEGIN, &STEPS[..]);
         // A coarser surface finds nearly the same weights; the last steps are the fine one's.
-        if let (1, Some(coarse)) = (parts.len(), space.coarser().filter(|c| c.axes()[0].spans() >= 128)) {
+        if let (1, Some(coarse)) = (parts.len(), coarser(&space).filter(|c| c.cells() >= 128 * 128)) {
             let mut parts = Part::windows(&coarse, &data.points, &centred, side)?;
             let found = search(unit, given, begin, &STEPS[..2], &mut |w, s| Part::validate_all(&mut parts, w, s))?;
             (begin, steps) = ([found.0 / unit, found.1], &STEPS[2..]);
@@ -189,12 +198,31 @@ pub fn surface(data: &Scatter, settings: FitSettings) -> Result<Fit, FitError> {
     if let Some(start) = start.filter(|x| x.len() == all.x.len()) {
         all.x = start;
     }
-    whole.solve(&mut all, weight, stiffening, 1e-8)?;
+    let converged = whole.solve(&mut all, weight, stiffening, 1e-8, MOST)?;
     let miss = |i: usize| eval(&space, &all.x, data.points[i]) - whole.values[i];
     let rms = ((0..m).map(|i| miss(i).powi(2)).sum::<f64>() / m as f64).sqrt();
     // The B-splines sum to one.
     let coefficients = all.x.iter().map(|v| v + mean).collect();
-    Ok(Fit { space, coefficients, weight, stiffening, rms, validation })
+    Ok(Fit { space, coefficients, weight, stiffening, rms, validation, converged })
+}
+
+/// Most iterations of the final solution. Ten to fifty are usual; weights that hardly smooth take more.
+const MOST: usize = 2000;
+/// Values above this have squares whose sums may be no numbers.
+pub(super) const LARGEST: f64 = 1e100;
+
+/// Spans an axis for `m` points over a domain with such sides: about four cells a point, about as long as wide.
+fn spans_for(m: usize, sides: [f64; 2]) -> [usize; 2] {
+    let even = ((2.0 * (m as f64).sqrt()) as usize).next_power_of_two().clamp(8, 512);
+    let aspect = (sides[0] / sides[1]).log2();
+    let doublings = aspect.abs().round() as u32;
+    // Where the doublings cannot be shared equally, half as many cells or twice as many.
+    let enough = even == 512 || even * even / 2 >= 4 * m;
+    let most = (even / 4).ilog2();
+    let fewer = (if enough { doublings.div_ceil(2) } else { doublings / 2 }).min(most);
+    let more = (doublings - fewer).min(if fewer == most { most } else { u32::MAX });
+    let (long, short) = (even << more, even >> fewer);
+    if aspect > 0.0 { [long, short] } else { [short, long] }
 }
 
 fn eval(space: &Space, x: &[f64], p: [f64; 2]) -> f64 {
@@ -222,7 +250,7 @@ const WINDOWS: u64 = 6;
 impl Part {
     fn new(space: Space, points: Vec<[f64; 2]>, values: Vec<f64>, side: f64) -> Part {
         let mut spaces = vec![space];
-        while let Some(next) = spaces[spaces.len() - 1].coarser().filter(|_| spaces[spaces.len() - 1].len() > 60) {
+        while let Some(next) = coarser(&spaces[spaces.len() - 1]).filter(|_| spaces[spaces.len() - 1].len() > 60) {
             spaces.push(next);
         }
         Part { spaces, points, values, side, folds: Vec::new() }
@@ -233,9 +261,18 @@ impl Part {
     /// Each is around a point, so that there are more where the points are.
     fn windows(space: &Space, points: &[[f64; 2]], values: &[f64], side: f64) -> Result<Vec<Part>, FitError> {
         let axes = space.axes();
-        let spans = axes[0].spans();
-        let share = (WINDOW / points.len() as f64).sqrt();
-        let few = ((spans as f64 * share).ceil() as usize).next_power_of_two().max(16).min(spans);
+        let spans = [0, 1].map(|a: usize| axes[a].spans());
+        let share = WINDOW / points.len() as f64;
+        let part = |a: usize, share: f64| {
+            ((spans[a] as f64 * share).ceil() as usize).next_power_of_two().max(16).min(spans[a])
+        };
+        let mut few = [part(0, share.sqrt()), part(1, share.sqrt())];
+        // A strip is cut across only.
+        for a in 0..2 {
+            if few[a] == spans[a] && spans[a] < spans[1 - a] {
+                few[1 - a] = part(1 - a, share);
+            }
+        }
         if few == spans {
             let mut part = Part::new(space.clone(), points.to_vec(), values.to_vec(), side);
             part.leave_out(10, 10);
@@ -246,13 +283,14 @@ impl Part {
             let centre = points[(seed::mix(k ^ 0x0e11) % points.len() as u64) as usize];
             let range = |a: usize| {
                 let axis = &axes[a];
-                let first = (axis.to_knots(centre[a]) - 0.5 * few as f64).round().clamp(0.0, (spans - few) as f64);
-                [axis.from_knots(first), axis.from_knots(first + few as f64)]
+                let first =
+                    (axis.to_knots(centre[a]) - 0.5 * few[a] as f64).round().clamp(0.0, (spans[a] - few[a]) as f64);
+                [axis.from_knots(first), axis.from_knots(first + few[a] as f64)]
             };
             let frame = [range(0), range(1)];
             let inside = |i: &usize| (0..2).all(|a| (frame[a][0]..=frame[a][1]).contains(&points[*i][a]));
             let chosen: Vec<usize> = (0..points.len()).filter(inside).collect();
-            let axis = |a: usize| Axis::new(Boundary::Open, few, frame[a]);
+            let axis = |a: usize| Axis::new(Boundary::Open, few[a], frame[a]);
             let (places, heights) = chosen.iter().map(|i| (points[*i], values[*i])).unzip();
             let mut part = Part::new(Space::surface(axis(0)?, axis(1)?), places, heights, side);
             part.leave_out(2, 10);
@@ -286,15 +324,21 @@ impl Part {
         self.folds = (0..count as u64).map(|k| self.fold(&|i| number(i) == k)).collect();
     }
 
-    fn solve(&self, fold: &mut Fold, weight: f64, stiffening: f64, tolerance: f64) -> Result<(), FitError> {
+    fn solve(
+        &self,
+        fold: &mut Fold,
+        weight: f64,
+        stiffening: f64,
+        tolerance: f64,
+        most: usize,
+    ) -> Result<bool, FitError> {
         let ratio = stiffening / self.side;
         let energy = Energy::new(weight * ratio * ratio, weight, 0.0)?;
         let h = Operator::new(&self.spaces[0], &energy, None);
         let Some(mut cycle) = Cycle::with_data(&self.spaces[0], &energy, &h, &fold.normals) else {
             return Err(FitError::Spans(self.spaces[0].axes()[0].spans()));
         };
-        cycle.conjugate_gradients(&fold.right, &mut fold.x, tolerance, 200);
-        Ok(())
+        Ok(cycle.conjugate_gradients(&fold.right, &mut fold.x, tolerance, most))
     }
 
     /// Root mean square of the predictions of what all folds leave out.
@@ -314,7 +358,7 @@ impl Part {
         let mut folds = std::mem::take(&mut self.folds);
         for fold in &mut folds {
             // From the solution of the last weights: neighbours are alike.
-            self.solve(fold, weight, stiffening, 1e-4)?;
+            self.solve(fold, weight, stiffening, 1e-4, 200)?;
             for &i in &fold.out {
                 sum += (eval(&self.spaces[0], &fold.x, self.points[i]) - self.values[i]).powi(2);
                 count += 1;

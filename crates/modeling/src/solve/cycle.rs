@@ -2,7 +2,9 @@
 
 use super::bpx::dense_factor;
 use super::cholesky::{Cholesky, dot, start};
+use super::strip::Strip;
 use super::transfer::Transfer;
+use crate::axis::Axis;
 use crate::energy::{Energy, Operator, Scratch, Stiffness};
 use crate::fit::Normal;
 use crate::system::{Space, Structure};
@@ -12,9 +14,63 @@ use std::sync::Arc;
 pub(crate) struct Cycle {
     levels: Vec<Level>,
     transfers: Vec<Transfer>,
-    coarse: Cholesky,
+    coarse: Coarsest,
     k: usize,
     work: Vec<f64>,
+}
+
+/// The factor of the coarsest level.
+enum Coarsest {
+    Dense(Cholesky),
+    /// Of a grid that is narrow along its second axis.
+    Rows(Strip),
+    /// Of a grid of so many columns that is narrow along its first axis: numbered the other way round.
+    Columns(Strip, usize),
+}
+
+impl Coarsest {
+    fn len(&self) -> usize {
+        match self {
+            Coarsest::Dense(factor) => factor.len(),
+            Coarsest::Rows(strip) | Coarsest::Columns(strip, _) => strip.len(),
+        }
+    }
+
+    fn solve(&self, x: &mut [f64]) {
+        match self {
+            Coarsest::Dense(factor) => {
+                factor.forward(x);
+                factor.backward(x);
+            }
+            Coarsest::Rows(strip) => strip.solve(x),
+            Coarsest::Columns(strip, columns) => {
+                let rows = x.len() / columns;
+                let mut turned: Vec<f64> = (0..x.len()).map(|i| x[i % rows * columns + i / rows]).collect();
+                strip.solve(&mut turned);
+                (0..x.len()).for_each(|i| x[i] = turned[i % columns * rows + i / columns]);
+            }
+        }
+    }
+}
+
+/// The next coarser space of a fit, down to 60 coefficients or a strip of one span: half the spans of both axes,
+/// or of the one whose spans are at most half as long as the other's. So the energy is about as steep along both where
+/// both are halved, and smoothing point by point works whatever the aspect.
+pub(crate) fn coarser(space: &Space) -> Option<Space> {
+    let &[s, t] = space.axes() else { return space.coarser() };
+    let half = |a: &Axis| {
+        let even = a.spans().is_multiple_of(2);
+        even.then(|| Axis::new(a.boundary(), a.spans() / 2, a.domain()).ok()).flatten()
+    };
+    let ratio = s.density() / t.density();
+    let next = if ratio > 0.5 && ratio < 2.0 {
+        (half(&s)?, half(&t)?)
+    } else if ratio >= 2.0 {
+        (half(&s)?, t)
+    } else {
+        (s, half(&t)?)
+    };
+    Some(Space::surface(next.0, next.1))
 }
 
 /// What is added to H.
@@ -129,7 +185,7 @@ const DEGREE: usize = 2;
 const POWER: usize = 16;
 
 impl Cycle {
-    /// H plus sums over scattered data, given for every level down to 60 coefficients or odd spans.
+    /// H plus sums over scattered data, given for every level that [`coarser`] makes.
     pub(crate) fn with_data(space: &Space, energy: &Energy, h: &Operator, data: &[Arc<Normal>]) -> Option<Cycle> {
         Cycle::new(space, energy, None, h, Added::Data(data))
     }
@@ -164,15 +220,14 @@ impl Cycle {
                     rows.push(terms.iter().flat_map(of));
                 }
             }
-            let coarser = now.coarser().filter(|_| n > 60);
+            let coarser = if data.is_empty() { now.coarser() } else { coarser(&now) }.filter(|_| n > 60);
             let Some(coarser) = coarser else {
-                if n * k > 3000 {
-                    return None;
-                }
                 let data = data.get(levels.len());
-                let coarse = match structure {
-                    None if data.is_none() => dense_factor(&operator, energy)?,
-                    _ => coarsest(&operator, &rows, &weights, k, data.map(|d| &**d))?,
+                let coarse = match (structure, data) {
+                    (None, Some(data)) if n > 60 => strip(&operator, data)?,
+                    _ if n * k > 3000 => return None,
+                    (None, None) => Coarsest::Dense(dense_factor(&operator, energy)?),
+                    _ => Coarsest::Dense(coarsest(&operator, &rows, &weights, k, data.map(|d| &**d))?),
                 };
                 return Some(Cycle { levels, transfers, coarse, k, work: Vec::new() });
             };
@@ -202,7 +257,7 @@ impl Cycle {
             };
             level.largest = largest(&mut level);
             levels.push(level);
-            transfers.push(Transfer::new(&coarser));
+            transfers.push(Transfer::between(&coarser, &now));
             let cells: Vec<usize> = coarser.axes().iter().map(crate::axis::Axis::spans).collect();
             map = map.map(|m| m.coarser(if cells.len() == 2 { [cells[0], cells[1]] } else { [1, cells[0]] }));
             operator = Operator::new(&coarser, energy, map.as_ref());
@@ -222,11 +277,12 @@ impl Cycle {
         self.levels.is_empty()
     }
 
-    /// Conjugate gradients on (H + data) x = b from the given x, to a relative residual (in the cycle's norm).
-    pub(crate) fn conjugate_gradients(&mut self, b: &[f64], x: &mut [f64], tolerance: f64, most: usize) {
+    /// Conjugate gradients on (H + data) x = b from the given x, to a relative residual (in the cycle's norm). False
+    /// where `most` iterations, or the digits of the numbers, do not suffice.
+    pub(crate) fn conjugate_gradients(&mut self, b: &[f64], x: &mut [f64], tolerance: f64, most: usize) -> bool {
         if self.is_direct() {
             self.cycle(b, x);
-            return;
+            return true;
         }
         let n = b.len();
         let (mut r, mut z, mut p, mut hp) = (vec![0.0; n], vec![0.0; n], vec![0.0; n], vec![0.0; n]);
@@ -255,6 +311,7 @@ impl Cycle {
             let beta = rz / old;
             p.iter_mut().zip(&z).for_each(|(p, z)| *p = z + beta * *p);
         }
+        rz <= goal
     }
 
     /// Coefficients of the finest level, one coordinate.
@@ -266,8 +323,7 @@ impl Cycle {
     pub(crate) fn cycle(&mut self, r: &[f64], z: &mut [f64]) {
         if self.levels.is_empty() {
             z.copy_from_slice(r);
-            self.coarse.forward(z);
-            self.coarse.backward(z);
+            self.coarse.solve(z);
             return;
         }
         self.levels[0].b.copy_from_slice(r);
@@ -292,8 +348,7 @@ impl Cycle {
             self.transfers[i].restrict(t, b, &mut self.work);
         }
         let solution = if last {
-            self.coarse.forward(&mut b);
-            self.coarse.backward(&mut b);
+            self.coarse.solve(&mut b);
             b
         } else {
             self.levels[i + 1].b = b;
@@ -312,6 +367,23 @@ impl Cycle {
         level.t = t;
         level.smooth(false);
     }
+}
+
+/// The factor of H + data on a grid that is narrow one way.
+fn strip(h: &Operator, data: &Normal) -> Option<Coarsest> {
+    let [rows, columns] = h.shape;
+    let turn = rows < columns;
+    let (band, number): (usize, &dyn Fn(usize) -> usize) =
+        if turn { (3 * rows + 3, &|i| i % columns * rows + i / columns) } else { (3 * columns + 3, &|i| i) };
+    let mut entries = Vec::new();
+    let mut put = |r: usize, c: usize, v: f64| {
+        let (r, c) = (number(r), number(c));
+        entries.push((r.max(c), r.min(c), v));
+    };
+    h.entries(&mut put);
+    data.entries(&mut put);
+    let strip = Strip::new(h.len(), band, &entries)?;
+    Some(if turn { Coarsest::Columns(strip, columns) } else { Coarsest::Rows(strip) })
 }
 
 fn coarsest(h: &Operator, rows: &SparseRows, weights: &[f64], k: usize, data: Option<&Normal>) -> Option<Cholesky> {

@@ -22,6 +22,7 @@ mod response;
 mod solution;
 mod sparse;
 mod spectral;
+mod strip;
 mod thesis;
 mod transfer;
 mod wavelet;

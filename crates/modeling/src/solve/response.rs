@@ -39,36 +39,21 @@ impl Solver {
         Ok(())
     }
 
-    /// The Green column of a row: how the coefficients answer to one unit of its target, coordinate by coordinate.
+    /// The Green column of a row: how the coefficients answer to one unit of the target that a constraint has for one
+    /// coordinate (a position or a derivative), coordinate by coordinate.
     ///
-    /// Rows are numbered as in [`super::Solution::residuals`], redundant ones left out by name. Costs one solution with
-    /// the factors at hand. `None` for redundant rows and for curvature.
+    /// Costs one solution with the factors at hand. `None` where the constraint has no row of its own there: free
+    /// coordinates, redundant rows, normals, images; and where a curvature is asked for.
     ///
     /// # Errors
     /// [`SolveError::Degenerate`].
-    pub fn response(&mut self, constraint: &str, part: usize) -> Result<Option<Vec<(usize, Vec<f64>)>>, SolveError> {
+    pub fn response(
+        &mut self,
+        constraint: &str,
+        coordinate: usize,
+    ) -> Result<Option<Vec<(usize, Vec<f64>)>>, SolveError> {
         let Some(number) = self.problem.constraints().iter().position(|c| c.id == constraint) else { return Ok(None) };
-        if self.newton > 0 {
-            return Ok(None);
-        }
-        // Rows of a constraint come in order, but each in the block of its coordinate.
-        let mut seen = 0;
-        let mut place = None;
-        let coordinates = self.problem.coordinates();
-        'search: for c in 0..coordinates {
-            for (b, (_, block)) in self.blocks.iter().enumerate() {
-                for (s, side) in block.sides.iter().enumerate().filter(|(_, s)| s.coordinates.first() == Some(&c)) {
-                    for r in (0..side.constraints.len()).filter(|r| side.constraints[*r] == number) {
-                        if seen == part {
-                            place = Some((b, s, r));
-                            break 'search;
-                        }
-                        seen += 1;
-                    }
-                }
-            }
-        }
-        let Some((b, s, r)) = place else { return Ok(None) };
+        let Some((b, s, r)) = self.row_of(number, coordinate).filter(|_| self.newton == 0) else { return Ok(None) };
         let kept = (self.at, self.stage, self.iterations, self.converged);
         let zero = {
             let structure = &self.blocks[b].0;
@@ -84,9 +69,14 @@ impl Solver {
         self.stage = Stage::Residual;
         let mut outcome = Ok(());
         while self.at == (b, s) && self.stage != Stage::Finished {
+            let method = self.method;
             if let Err(e) = self.advance() {
                 outcome = Err(e);
                 break;
+            }
+            if self.method != method {
+                // The spare begins with the first side, but only this one is wanted.
+                self.at = (b, s);
             }
         }
         let column = std::mem::replace(&mut self.sides[b][s], state);
@@ -96,5 +86,15 @@ impl Solver {
         let n = self.problem.space().len();
         let of = |(i, c): (usize, &usize)| (*c, column.x[i * n..][..n].to_vec());
         Ok(Some(self.blocks[b].1.sides[s].coordinates.iter().enumerate().map(of).collect()))
+    }
+    /// Block, side and row of the target that a constraint has for a coordinate.
+    fn row_of(&self, number: usize, coordinate: usize) -> Option<(usize, usize, usize)> {
+        self.blocks.iter().enumerate().find_map(|(b, (structure, block))| {
+            block.sides.iter().enumerate().find_map(|(s, side)| {
+                let local = side.coordinates.iter().position(|c| *c == coordinate)?;
+                let own = |r: &usize| side.constraints[*r] == number && structure.terms[*r][0].0 == local;
+                (0..side.constraints.len()).find(own).map(|r| (b, s, r))
+            })
+        })
     }
 }

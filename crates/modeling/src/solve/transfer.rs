@@ -1,5 +1,6 @@
 //! Exact refinement of a spline onto half spans, and its transpose, on grids.
 
+use crate::axis::Axis;
 use crate::system::Space;
 use ondelette_wavelet::Boundary;
 
@@ -60,6 +61,12 @@ impl Refine {
             .flat_map(|(c, col)| col.iter().map(move |&(r, v)| (r, c, v)))
             .collect();
         Refine { coarse, fine, rows, lo, hi, shift, edges }
+    }
+
+    /// An axis that stays as it is.
+    fn identity(n: usize) -> Refine {
+        let rows = (0..n).map(|i| vec![(i, 1.0)]).collect();
+        Refine { coarse: n, fine: n, rows, lo: 0, hi: 0, shift: 0, edges: (0..n).map(|i| (i, i, 1.0)).collect() }
     }
 
     /// `y = R x` along rows.
@@ -258,6 +265,15 @@ impl Transfer {
         Transfer { axes: coarse.axes().iter().map(|a| Refine::new(a.boundary(), a.spans())).collect() }
     }
 
+    /// From a space to one that has twice as many spans on an axis, or as many.
+    pub(crate) fn between(coarse: &Space, fine: &Space) -> Transfer {
+        let axis = |(c, f): (&Axis, &Axis)| match c.spans() == f.spans() {
+            true => Refine::identity(c.len()),
+            false => Refine::new(c.boundary(), c.spans()),
+        };
+        Transfer { axes: coarse.axes().iter().zip(fine.axes()).map(axis).collect() }
+    }
+
     /// `fine = R coarse`.
     pub(crate) fn refine(&self, coarse: &[f64], fine: &mut [f64], work: &mut Vec<f64>) {
         match &self.axes[..] {
@@ -288,7 +304,6 @@ impl Transfer {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::axis::Axis;
 
     #[test]
     fn refined_coefficients_are_the_same_function_and_restriction_is_the_transpose() {
@@ -312,6 +327,34 @@ mod tests {
                 let v: f64 = back.iter().zip(&x).map(|(a, b)| a * b).sum();
                 assert!((u - v).abs() < 1e-12);
             }
+        }
+    }
+
+    #[test]
+    fn a_grid_refined_along_one_axis_is_the_same_surface() {
+        let axis = |n: usize| Axis::new(Boundary::Open, n, [0.0, 1.0]).unwrap();
+        let coarse = Space::surface(axis(4), axis(9));
+        for fine in [Space::surface(axis(8), axis(9)), Space::surface(axis(4), axis(18))] {
+            let transfer = Transfer::between(&coarse, &fine);
+            let x: Vec<f64> = (0..coarse.len()).map(|i| ((i * i) as f64).sin()).collect();
+            let mut y = vec![0.0; fine.len()];
+            transfer.refine(&x, &mut y, &mut Vec::new());
+            let value = |space: &Space, x: &[f64], at: [f64; 2]| -> f64 {
+                let [s, t] = space.axes() else { return f64::NAN };
+                let along = crate::basis::taps(t, at[1], 0);
+                let row = |i: usize| along.apply(&x[i * t.len()..][..t.len()]);
+                crate::basis::taps(s, at[0], 0).iter().map(|(i, v)| v * row(i)).sum()
+            };
+            for k in 0..=30 {
+                let at = [k as f64 / 30.0, (7 * k % 31) as f64 / 30.0];
+                assert!((value(&coarse, &x, at) - value(&fine, &y, at)).abs() < 1e-14);
+            }
+            let r: Vec<f64> = (0..fine.len()).map(|i| (i as f64).cos()).collect();
+            let mut back = vec![0.0; coarse.len()];
+            transfer.restrict(&r, &mut back, &mut Vec::new());
+            let u: f64 = r.iter().zip(&y).map(|(a, b)| a * b).sum();
+            let v: f64 = back.iter().zip(&x).map(|(a, b)| a * b).sum();
+            assert!((u - v).abs() < 1e-12);
         }
     }
 

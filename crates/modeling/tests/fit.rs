@@ -1,0 +1,147 @@
+//! Fits against other solvers, and what they say when they cannot do what is asked.
+
+use ondelette_modeling::constraint::{Constraint, Demand};
+use ondelette_modeling::energy::Energy;
+use ondelette_modeling::fit::{FairError, FitError, FitSettings, Scatter, curve, fair, surface};
+use ondelette_modeling::solve::{Method, Settings, Solver};
+use ondelette_modeling::system::Problem;
+use ondelette_numerics::seed;
+
+fn random(k: u64, i: u64) -> f64 {
+    seed::unit(seed::combine(k, i))
+}
+
+/// Heights of a wave with some noise, on a domain of the given sides.
+fn wave(count: u64, sides: [f64; 2]) -> (Vec<[f64; 2]>, Vec<f64>) {
+    let of = |i: u64| {
+        let [x, y] = [random(1, i), random(2, i)];
+        ([sides[0] * x, sides[1] * y], (6.0 * x).sin() * (4.0 * y).cos() + 0.1 * (random(3, i) - 0.5))
+    };
+    (0..count).map(of).unzip()
+}
+
+#[test]
+fn a_fit_is_the_least_of_its_sum_whatever_the_sides_of_the_domain() {
+    for sides in [[1.0, 1.0], [30.0, 1.0], [1.0, 30.0], [1000.0, 1.0], [1.0, 1000.0], [1e6, 1.0]] {
+        let (places, heights) = wave(200, sides);
+        let (weight, stiffening) = (1e-5 * sides[0] * sides[1], 2.0);
+        let settings = FitSettings {
+            weight: Some(weight),
+            stiffening: Some(stiffening),
+            spans: Some(16),
+            ..FitSettings::default()
+        };
+        let fit = surface(&Scatter::new(places.clone(), heights.clone()).unwrap(), settings).unwrap();
+        assert!(fit.converged, "{sides:?}");
+        let mean = heights.iter().sum::<f64>() / 200.0;
+        let soft = |(i, (p, z)): (usize, (&[f64; 2], &f64))| {
+            Constraint::new(i.to_string(), p, Demand::Position(vec![Some(z - mean)])).soft(1.0)
+        };
+        let rows = places.iter().zip(&heights).enumerate().map(soft).collect();
+        let area: f64 = fit.space.axes().iter().map(|a| a.domain()[1] - a.domain()[0]).product();
+        let energy = Energy::new(weight * stiffening * stiffening / area, weight, 0.0).unwrap();
+        let problem = Problem::new(fit.space.clone(), 1, energy, None, rows).unwrap();
+        let settings = Settings { method: Method::Cholesky, ..Settings::default() };
+        let want = Solver::new(problem, settings).unwrap().run().unwrap();
+        let pairs = fit.coefficients.iter().zip(&want.coefficients()[0]);
+        let off = pairs.fold(0.0, |m: f64, (a, b)| m.max((a - mean - b).abs()));
+        assert!(off < 1e-4, "{sides:?}: off by {off}");
+    }
+}
+
+#[test]
+fn a_long_domain_has_more_spans_along_than_across() {
+    for (sides, want) in [
+        ([1.0, 1.0], [32, 32]),
+        ([1.3, 1.0], [32, 32]),
+        ([16.0, 1.0], [128, 8]),
+        ([1.0, 16.0], [8, 128]),
+        ([1e4, 1.0], [256, 4]),
+    ] {
+        let (places, heights) = wave(200, sides);
+        let given = FitSettings {
+            weight: Some(1e-3 * sides[0] * sides[1]),
+            stiffening: Some(1.0),
+            domain: Some([[0.0, sides[0]], [0.0, sides[1]]]),
+            ..FitSettings::default()
+        };
+        let fit = surface(&Scatter::new(places, heights).unwrap(), given).unwrap();
+        assert_eq!(fit.space.axes().iter().map(|a| a.spans()).collect::<Vec<_>>(), want, "{sides:?}");
+        assert!(fit.converged, "{sides:?}");
+    }
+}
+
+#[test]
+fn the_smoothing_of_a_long_domain_is_chosen_as_that_of_a_square_one() {
+    // The same wave four times as long, with four times the points: as predictable as one square of it.
+    let of = |i: u64| {
+        let [x, y] = [4.0 * random(1, i), random(2, i)];
+        ([x, y], (2.0 * x).sin() * (2.0 * y).cos() + 0.2 * (random(3, i) - 0.5))
+    };
+    let (places, heights) = (0..300).map(of).unzip();
+    let fit = surface(&Scatter::new(places, heights).unwrap(), FitSettings::default()).unwrap();
+    assert_eq!(fit.space.axes().iter().map(|a| a.spans()).collect::<Vec<_>>(), [128, 32]);
+    // The noise is 0.058 rms.
+    assert!(fit.converged && fit.validation.unwrap() < 0.075, "{:?}", fit.validation);
+}
+
+#[test]
+fn a_fit_that_does_not_converge_says_so() {
+    let (places, heights) = wave(300, [1.0, 1.0]);
+    let settings =
+        FitSettings { weight: Some(1e-12), stiffening: Some(0.0), spans: Some(32), ..FitSettings::default() };
+    assert!(!surface(&Scatter::new(places, heights).unwrap(), settings).unwrap().converged);
+}
+
+#[test]
+fn what_is_given_leaves_the_other_free_even_where_no_search_would_go() {
+    let (places, heights) = wave(300, [1.0, 1.0]);
+    let scatter = Scatter::new(places, heights).unwrap();
+    let fitted = |weight, stiffening| {
+        let spans = Some(8);
+        surface(&scatter, FitSettings { weight, stiffening, spans, ..FitSettings::default() }).unwrap()
+    };
+    let free = fitted(None, None).validation.unwrap();
+    for stiffening in [0.0, 1e4] {
+        let start = 1e-8 * 300.0;
+        let fit = fitted(None, Some(stiffening));
+        assert!((fit.weight / start).ln().abs() > 1.0, "stiffening {stiffening}: weight {} is the start", fit.weight);
+        assert!(stiffening > 1.0 || fit.validation.unwrap() < 1.1 * free);
+    }
+    let fit = fitted(Some(1e7), None);
+    assert_ne!(fit.stiffening, 10.0, "the start");
+    let ring: Vec<Vec<f64>> = (0..60)
+        .map(|i| {
+            let r = 1.0 + 0.05 * (random(4, i) - 0.5);
+            let a = i as f64 / 60.0 * std::f64::consts::TAU;
+            vec![r * a.cos(), r * a.sin()]
+        })
+        .collect();
+    let fit = curve(&ring, true, FitSettings { stiffening: Some(0.0), ..FitSettings::default() }).unwrap();
+    assert!((fit.weight / (60.0 * 1e-8)).ln().abs() > 1.0, "{}", fit.weight);
+}
+
+#[test]
+fn heights_without_squares_are_refused() {
+    let places: Vec<[f64; 2]> = (0..20).map(|i| [random(1, i), random(2, i)]).collect();
+    let scatter = Scatter::new(places.clone(), vec![1e200; 20]).unwrap();
+    assert_eq!(surface(&scatter, FitSettings::default()).unwrap_err(), FitError::Large(1e200));
+    let outline: Vec<Vec<f64>> = places.iter().map(|p| vec![1e150 * p[0], p[1]]).collect();
+    assert!(matches!(curve(&outline, false, FitSettings::default()), Err(FitError::Large(_))));
+}
+
+#[test]
+fn a_fair_curve_reaches_tolerances_far_below_the_noise_and_says_which_it_cannot() {
+    let points: Vec<Vec<f64>> = (0..120)
+        .map(|i| {
+            let (a, r) = (i as f64 / 119.0 * std::f64::consts::PI, 1.0 + 0.04 * (random(5, i) - 0.5));
+            vec![r * a.cos(), r * a.sin()]
+        })
+        .collect();
+    for tolerance in [1e-4, 1e-6, 1e-9] {
+        let found = fair(&points, tolerance).unwrap();
+        assert!(found.largest_move <= tolerance && found.largest_move > 0.5 * tolerance);
+    }
+    let refused = fair(&points, 1e-18).unwrap_err();
+    assert!(matches!(refused, FairError::Unreachable { .. }), "{refused}");
+}
