@@ -166,7 +166,7 @@ impl Correct for Multigrid {
         self.iterations
     }
 
-    fn patience(&self) -> (usize, f64) {
+    fn patience(&self, _met: bool) -> (usize, f64) {
         (400, 0.98)
     }
 }

@@ -82,6 +82,11 @@ impl Correct for SparseSolver {
         true
     }
 
+    fn patience(&self, met: bool) -> (usize, f64) {
+        // Multipliers of crowded rows come slowly, but they come.
+        if met { (30, 0.3) } else { (300, 0.98) }
+    }
+
     fn correction(&self) -> (&[f64], &[f64]) {
         (&self.x, &self.l)
     }
