@@ -4,8 +4,8 @@
 //! The energy alone is not enough of a second derivative: the forces of the curvature constraints bend with the shape,
 //! and where they stiffen it they are added as soft rows. (Where they soften it they are left out, so that every
 //! program has a least; a step then is shorter than Newton's, never longer.) Merit is half the energy plus the misses
-//! times more than the forces, an exact penalty, compared with the worst of the last few shapes (Grippo, Lampariello and
-//! Lucidi 1986) because curved constraints make good whole steps look bad.
+//! times more than the forces, an exact penalty, compared with the worst of the last few shapes (Grippo, Lampariello
+//! and Lucidi 1986) because curved constraints make good whole steps look bad.
 
 use super::refine::{SolveError, Solver, Stage, fresh_sides};
 use crate::constraint::{Demand, Row, curvature};

@@ -1,6 +1,6 @@
 //! The stepped solver: blocks one after another, each refined until it no longer moves.
 
-use super::auto::{choose, spare};
+use super::auto::{self, choose, fits, spare};
 use super::banded::{BandGreen, Banded};
 use super::bpx::Bpx;
 use super::correct::Correct;
@@ -120,9 +120,6 @@ pub(crate) enum Stage {
     Finished,
 }
 
-/// Rows for which multigrid prepares a cycle each, and projects; with more it works by multipliers.
-const CYCLES: usize = 100;
-
 impl Solver {
     /// Prepares a solver: blocks, the method's rule, redundant rows. The factors are made in the first step.
     ///
@@ -136,6 +133,7 @@ impl Solver {
         let (blocks, redundant) = problem.blocks(rows)?;
         let h = Arc::new(Operator::new(problem.space(), problem.energy(), problem.stiffness()));
         let (method, why) = choose(&problem, &h, settings.method)?;
+        blocks.iter().try_for_each(|b| fits(&b.structure, method))?;
         let spare = if settings.method == Method::Auto { spare(&problem, method) } else { None };
         let notes = notes(&problem, &redundant);
         // Those that are missed for good are in the notes.
@@ -361,10 +359,10 @@ impl Solver {
                 Box::new(green.ok_or_else(|| unfit("it is for curves"))?)
             }
             Method::Cholesky => {
-                let solver = SparseSolver::new(&self.h, structure);
+                let solver = SparseSolver::new(&self.h, structure, energy.free_degree());
                 return Ok(Box::new(solver.ok_or_else(|| unfit("the matrix has no factor"))?));
             }
-            Method::Multigrid if structure.rows() <= CYCLES || space.is_curve() => {
+            Method::Multigrid if structure.rows() <= auto::CYCLES || space.is_curve() => {
                 let green = CycleGreen::new(space, energy, map, &self.h);
                 Box::new(green.ok_or_else(|| unfit("the spans do not halve often enough"))?)
             }
