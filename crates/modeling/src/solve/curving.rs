@@ -59,8 +59,9 @@ fn farther(before: &[Vec<f64>], now: &[Vec<f64>]) -> Option<f64> {
 }
 
 impl Solver {
-    /// After a linear solution: prepares the next program, if there are curvature constraints that need one.
-    pub(super) fn curve(&mut self) -> Result<bool, SolveError> {
+    /// After a linear solution: prepares the next program, if there are curvature constraints that need one. Notes from
+    /// `said` on are about that solution, and go with it.
+    pub(super) fn curve(&mut self, said: usize) -> Result<bool, SolveError> {
         if !self.problem.constraints().iter().any(|c| matches!(c.demand, Demand::Curvature(_))) {
             return Ok(false);
         }
@@ -82,6 +83,7 @@ impl Solver {
             return self.program(Curving { from: to, last, price, soft, way: None });
         };
         if !self.converged || !finite {
+            self.notes.truncate(said);
             return Ok(self.give_up(&curving.from));
         }
         let size = to.iter().flatten().fold(0.0, |m: f64, v| m.max(v.abs()));

@@ -209,8 +209,9 @@ impl Solver {
         }
         let (b, s) = self.at;
         if b >= self.blocks.len() {
+            let said = self.notes.len();
             self.judge();
-            if self.curve()? {
+            if self.curve(said)? {
                 return self.advance();
             }
             self.stage = Stage::Finished;
