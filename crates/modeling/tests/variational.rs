@@ -422,6 +422,47 @@ fn curvature_is_met_by_newton_steps() {
 }
 
 #[test]
+fn very_many_constraints_on_a_surface_need_no_dense_matrix() {
+    let a = axis(Boundary::Open, 64);
+    let row = |i: usize| {
+        let at = |k: u64| 64.0 * seed::unit(seed::combine(k, i as u64));
+        point(i, &[at(1), at(2)], seed::unit(seed::combine(3, i as u64))).soft(10.0)
+    };
+    let make = |rows: usize| Problem::new(Space::surface(a, a), 1, Energy::BEND, None, (0..rows).map(row).collect());
+    // A dense matrix of 6000 rows and its factor took seconds, of 40000 the program's life.
+    let crowd = solve(&make(6000).unwrap(), Method::Auto, 1e-8).unwrap();
+    assert!(crowd.converged() && crowd.method().0 == Method::Multigrid, "{:?}", crowd.method());
+    let few = make(2600).unwrap();
+    let (got, want) = (solve(&few, Method::Auto, 1e-10).unwrap(), solve(&few, Method::Bpx, 1e-10).unwrap());
+    assert!(far(&got.coefficients()[0], &want.coefficients()[0]) < 1e-8);
+    let refused = Solver::new(make(40_000).unwrap(), Settings { method: Method::Bpx, ..Settings::default() });
+    let said = refused.err().map(|e| e.to_string()).unwrap_or_default();
+    assert!(said.contains("bytes") && said.contains("multigrid"), "{said}");
+}
+
+#[test]
+fn what_rows_hardly_hold_is_found_by_the_sparse_factor_too() {
+    // One point, and a weight that is nothing beside the energy's: a factor alone is left with rounding.
+    let short = Axis::new(Boundary::Open, 16, [0.0, 0.01]).unwrap();
+    let axis = |b: f64| Axis::new(Boundary::Open, 32, [0.0, b]).unwrap();
+    let both = Energy::new(1.0, 1.0, 0.0).unwrap();
+    for (space, energy, at, weight) in [
+        (Space::surface(axis(1.0), axis(1.0)), Energy::BEND, vec![0.01, 0.714], None),
+        (Space::surface(axis(1.0), axis(0.1)), Energy::BEND, vec![0.01, 0.0714], None),
+        (Space::curve(short), both, vec![0.004_26], Some(1e-5)),
+        (Space::curve(short), Energy::BEND, vec![0.004_26], Some(1e-5)),
+    ] {
+        let one = Constraint::new("one", &at, Demand::Position(vec![Some(-0.86)]));
+        let row = weight.map_or(one.clone(), |w| one.soft(w));
+        let problem = Problem::new(space, 1, energy, None, vec![row]).unwrap();
+        let found = solve(&problem, Method::Cholesky, 1e-8).unwrap();
+        assert!(found.converged(), "{at:?}");
+        assert!(found.residuals()[0].miss.abs() < 1e-8, "{at:?}: {:e}", found.residuals()[0].miss);
+        assert!(found.coefficients()[0].iter().all(|x| x.abs() < 10.0), "{at:?}");
+    }
+}
+
+#[test]
 fn the_thesis_iterates_to_the_same_shapes() {
     let a = axis(Boundary::Mirrored, 16);
     let rows = (0..5).map(|i| point(i, &[4.0 * i as f64], seed::unit(i as u64))).collect();

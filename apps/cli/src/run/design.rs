@@ -65,7 +65,7 @@ pub(crate) fn run(plan: &DesignPlan) -> Result<Outcome, Refusal> {
     }
     stages.end("solve");
     // A solver that could not begin has no state worth writing.
-    if !solution.converged() && !stopped && solution.iterations() == 0 && !solution.notes().is_empty() {
+    if !solution.converged() && !stopped && !solution.begun() && !solution.notes().is_empty() {
         return Err(named(&solution.notes().join("; ")));
     }
     if !solution.energy().is_finite() {

@@ -1,20 +1,21 @@
-//! Curvature constraints, linear around a given curve: one Newton step's rows.
+//! Curvature constraints at a given curve: how far they are missed, and rows linear around it for Newton's method.
 
 use super::row::{Row, Term, place};
 use super::{Demand, Functional};
 use crate::solve::Residual;
 use crate::system::Problem;
+use faer::{MatRef, Side};
 
-/// Rows of all curvature constraints, and how far they are missed.
-#[derive(Default)]
-pub(crate) struct Linearised {
-    pub(crate) rows: Vec<Row>,
-    pub(crate) misses: Vec<Residual>,
-    /// Largest miss, and the size that it is judged by.
-    pub(crate) miss: f64,
-    pub(crate) size: f64,
-    /// Constraints at points where the tangent has collapsed.
-    pub(crate) degenerate: Vec<String>,
+/// A curvature constraint at a given curve.
+pub(crate) struct Seen {
+    pub(crate) constraint: usize,
+    want: f64,
+    one: Functional,
+    two: Functional,
+    d1: Vec<f64>,
+    d2: Vec<f64>,
+    /// Curvature and its gradients by the first and second derivative; `None` where the tangent has collapsed.
+    found: Option<(f64, Vec<f64>, Vec<f64>)>,
 }
 
 /// Curvature with its gradients by the first and second derivative; `None` where the tangent vanishes.
@@ -58,39 +59,154 @@ pub(crate) fn curvature(d1: &[f64], d2: &[f64]) -> Option<(f64, Vec<f64>, Vec<f6
     Some((k, first, by2.iter().map(|b| b / cube).collect()))
 }
 
-/// The rows around the curve with the given coefficients.
-pub(crate) fn rows(problem: &Problem, coefficients: &[Vec<f64>]) -> Linearised {
-    let mut out = Linearised { size: 1e-300, ..Linearised::default() };
-    for (number, c) in problem.constraints().iter().enumerate() {
+/// The matrix of second derivatives of curvature by first and second derivative, row by row.
+fn second(d1: &[f64], d2: &[f64]) -> Vec<f64> {
+    let n = d1.len();
+    let mut out = vec![0.0; 4 * n * n];
+    if let ([f1], [f2]) = (d1, d2) {
+        let s = 1.0 + f1 * f1;
+        let mixed = -3.0 * f1 * s.powf(-2.5);
+        return vec![f2 * (15.0 * f1 * f1 * s.powf(-3.5) - 3.0 * s.powf(-2.5)), mixed, mixed, 0.0];
+    }
+    let at = |i: usize, j: usize| 2 * n * i + j;
+    let square: f64 = d1.iter().map(|v| v * v).sum();
+    let cube = square * square.sqrt();
+    // Curvature is size / cube, size that of the cross product.
+    let pad = |v: &[f64]| [v[0], v[1], v.get(2).copied().unwrap_or(0.0)];
+    let cross =
+        |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let v = cross(pad(d1), pad(d2));
+    let length = dot(v, v).sqrt();
+    let (size, u) = match n {
+        2 => (v[2], [0.0, 0.0, 1.0]),
+        _ if length > 1e-12 * square => (length, v.map(|v| v / length)),
+        // On a straight place the direction is anybody's guess, and so is how it turns.
+        _ => return out,
+    };
+    let unit = |i: usize| std::array::from_fn(|k| if k == i % n { 1.0 } else { 0.0 });
+    // What the cross product changes by, along each variable.
+    let change = |i: usize| if i < n { cross(unit(i), pad(d2)) } else { cross(pad(d1), unit(i)) };
+    let first = |i: usize| dot(u, change(i));
+    let by = |i: usize| if i < n { d1[i] } else { 0.0 };
+    for i in 0..2 * n {
+        for j in 0..2 * n {
+            let mut sum = match (i < n, j < n) {
+                (true, false) => dot(u, cross(unit(i), unit(j))),
+                (false, true) => dot(u, cross(unit(j), unit(i))),
+                _ => 0.0,
+            };
+            if n == 3 {
+                sum += (dot(change(i), change(j)) - first(i) * first(j)) / size;
+            }
+            let bent = sum - 3.0 / square * (first(i) * by(j) + by(i) * first(j));
+            let straight = if i == j && i < n { 3.0 / square } else { 0.0 };
+            out[at(i, j)] = (bent + size * (15.0 * by(i) * by(j) / square / square - straight)) / cube;
+        }
+    }
+    out
+}
+
+impl Seen {
+    /// Curvature minus what is wanted; `None` where there is none.
+    pub(crate) fn miss(&self) -> Option<f64> {
+        self.found.as_ref().map(|f| f.0 - self.want).filter(|m| m.is_finite())
+    }
+
+    /// What a miss is judged by, for a shape of the given length.
+    pub(crate) fn unit(&self, length: f64) -> f64 {
+        self.want.abs().max(1.0 / length)
+    }
+
+    /// The hard row around this curve, and soft ones that hold the derivatives where `force` times the curvature bends
+    /// upwards: the part of Newton's matrix that may be added to the energy without losing its least.
+    pub(crate) fn rows(&self, force: f64, out: &mut Vec<Row>) {
+        let Some((k, by1, by2)) = &self.found else { return };
+        let n = self.d1.len();
+        let terms = |first: &[f64], second: &[f64]| {
+            let one = |i: usize| Term { coordinate: i, functional: self.one.clone(), factor: first[i] };
+            let two = |i: usize| Term { coordinate: i, functional: self.two.clone(), factor: second[i] };
+            (0..n).flat_map(|i| [one(i), two(i)]).collect::<Vec<Term>>()
+        };
+        let value = |first: &[f64], second: &[f64]| -> f64 {
+            (0..n).map(|i| first[i] * self.d1[i] + second[i] * self.d2[i]).sum()
+        };
+        out.extend(Row::new(self.constraint, terms(by1, by2), self.want - k + value(by1, by2), None));
+        if force == 0.0 {
+            return;
+        }
+        let matrix: Vec<f64> = second(&self.d1, &self.d2).into_iter().map(|v| force * v).collect();
+        // The units of both derivatives differ by that of the parameter.
+        let unit = |i: usize| if i < n { 1.0 } else { self.stretch() };
+        let m = 2 * n;
+        let scaled: Vec<f64> = (0..m * m).map(|e| matrix[e] * unit(e / m) * unit(e % m)).collect();
+        let Ok(eigen) = MatRef::from_column_major_slice(&scaled, m, m).self_adjoint_eigen(Side::Lower) else { return };
+        let most = (0..m).map(|j| eigen.S()[j].abs()).fold(0.0, f64::max);
+        for j in (0..m).filter(|j| eigen.S()[*j] > 1e-9 * most) {
+            let factor: Vec<f64> = (0..m).map(|i| eigen.U()[(i, j)] / unit(i)).collect();
+            let (first, second) = factor.split_at(n);
+            let target = value(first, second);
+            out.extend(Row::new(self.constraint, terms(first, second), target, Some(eigen.S()[j])));
+        }
+    }
+
+    /// A second derivative, of the first ones' size, over a first.
+    fn stretch(&self) -> f64 {
+        length_of(&self.two) / length_of(&self.one).max(f64::MIN_POSITIVE)
+    }
+}
+
+fn length_of(f: &Functional) -> f64 {
+    f.entries().map(|(_, v)| v * v).sum::<f64>().sqrt()
+}
+
+/// A first derivative that is this share of what coefficients of the shape's size could give is none.
+const COLLAPSED: f64 = 1e-13;
+
+/// All curvature constraints at the curve with the given coefficients.
+pub(crate) fn look(problem: &Problem, coefficients: &[Vec<f64>]) -> Vec<Seen> {
+    let mut out = Vec::new();
+    // Tangents of nothing but rounding have no direction.
+    let size = coefficients.iter().flatten().fold(problem.least_scale(), |m: f64, v| m.max(v.abs()));
+    for (constraint, c) in problem.constraints().iter().enumerate() {
         let Demand::Curvature(want) = c.demand else { continue };
         let at = place(&c.at);
         let of = |order: usize| Functional::new(problem.space(), at, [0, order]);
         let (one, two) = (of(1), of(2));
         let d1: Vec<f64> = coefficients.iter().map(|x| one.apply(x)).collect();
         let d2: Vec<f64> = coefficients.iter().map(|x| two.apply(x)).collect();
-        let Some((k, by1, by2)) = curvature(&d1, &d2) else {
-            out.degenerate.push(c.id.clone());
-            out.misses.push(Residual { id: c.id.clone(), soft: false, miss: want.abs() });
-            continue;
-        };
-        out.misses.push(Residual { id: c.id.clone(), soft: false, miss: k - want });
-        out.miss = out.miss.max((k - want).abs());
-        out.size = out.size.max(want.abs()).max(k.abs());
-        let mut terms = Vec::new();
-        let mut target = want - k;
-        for i in 0..d1.len() {
-            terms.push(Term { coordinate: i, functional: one.clone(), factor: by1[i] });
-            terms.push(Term { coordinate: i, functional: two.clone(), factor: by2[i] });
-            target += by1[i] * d1[i] + by2[i] * d2[i];
-        }
-        out.rows.extend(Row::new(number, terms, target, None));
+        let speed = d1.iter().map(|v| v * v).sum::<f64>().sqrt();
+        let collapsed = d1.len() > 1 && speed <= COLLAPSED * size * length_of(&one);
+        let found = curvature(&d1, &d2).filter(|_| !collapsed);
+        out.push(Seen { constraint, want, one, two, d1, d2, found });
     }
     out
 }
 
+/// The misses of all curvature constraints: what was wanted, where there is no curvature.
+pub(crate) fn misses(problem: &Problem, coefficients: &[Vec<f64>]) -> Vec<Residual> {
+    let of = |s: Seen| {
+        let id = problem.constraints()[s.constraint].id.clone();
+        Residual { id, soft: false, miss: s.miss().unwrap_or(s.want.abs()) }
+    };
+    look(problem, coefficients).into_iter().map(of).collect()
+}
+
+/// The length of the polygon of the coefficients, about that of the curve; of a height, that of its graph.
+pub(crate) fn length(problem: &Problem, coefficients: &[Vec<f64>]) -> f64 {
+    let axis = &problem.space().axes()[0];
+    let run = if coefficients.len() == 1 { 1.0 / axis.density() } else { 0.0 };
+    let n = coefficients.first().map_or(0, Vec::len);
+    let step = |i: usize| -> f64 {
+        let square: f64 = coefficients.iter().map(|x| (x[i + 1] - x[i]).powi(2)).sum();
+        (square + run * run).sqrt()
+    };
+    (0..n.saturating_sub(1)).map(step).sum()
+}
+
 #[cfg(test)]
 mod tests {
-    use super::curvature;
+    use super::{curvature, second};
 
     #[test]
     fn gradients_are_those_of_differences() {
@@ -108,6 +224,23 @@ mod tests {
                 };
                 assert!(((at(h, 0.0) - at(-h, 0.0)) / (2.0 * h) - g1[i]).abs() < 1e-7);
                 assert!(((at(0.0, h) - at(0.0, -h)) / (2.0 * h) - g2[i]).abs() < 1e-7);
+                let n = d1.len();
+                let slopes = |a: f64, b: f64| {
+                    let (mut p, mut q) = (d1.clone(), d2.clone());
+                    p[i] += a;
+                    q[i] += b;
+                    let (_, g1, g2) = curvature(&p, &q).unwrap();
+                    [g1, g2].concat()
+                };
+                let matrix = second(&d1, &d2);
+                for (row, [more, less]) in
+                    [(i, [slopes(h, 0.0), slopes(-h, 0.0)]), (n + i, [slopes(0.0, h), slopes(0.0, -h)])]
+                {
+                    for j in 0..2 * n {
+                        let want = (more[j] - less[j]) / (2.0 * h);
+                        assert!((matrix[2 * n * row + j] - want).abs() < 1e-6, "{n} {row} {j}");
+                    }
+                }
             }
         }
     }

@@ -202,6 +202,14 @@ impl Constraint {
                 if coordinates == 3 && *k < 0.0 {
                     return unfit("a space curve has no negative curvature");
                 }
+                let [from, to] = space.axes()[0].domain();
+                let slack = 1e-12 * (to - from);
+                if coordinates > 1
+                    && space.axes()[0].boundary() == ondelette_wavelet::Boundary::Mirrored
+                    && (self.at[0] <= from + slack || self.at[0] >= to - slack)
+                {
+                    return unfit("the tangent at a mirrored end is 0, so there is no curvature: use an open boundary");
+                }
                 Ok(())
             }
             Demand::Image { of, factors, offset } => {

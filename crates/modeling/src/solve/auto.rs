@@ -4,7 +4,7 @@ use super::bpx;
 use super::method::Method;
 use super::refine::SolveError;
 use crate::energy::Operator;
-use crate::system::Problem;
+use crate::system::{MEMORY, Problem, ProblemError, Structure};
 use ondelette_wavelet::Boundary;
 
 /// Coefficients of the coarsest level up to which its dense factor costs next to nothing.
@@ -19,6 +19,15 @@ const STIFF: usize = 4500;
 /// Rows of a curve from which on their dense products cost more than a sparse factor.
 const MANY: usize = 64;
 
+/// Rows of a surface from which on their dense matrix costs more than multigrid with multipliers.
+const CROWD: usize = 2500;
+
+/// Coefficients of the coarsest level, all coordinates, that multigrid with multipliers makes a dense factor of.
+const COARSEST: usize = 1000;
+
+/// Rows for which multigrid prepares a cycle each, and projects; with more it works by multipliers.
+pub(crate) const CYCLES: usize = 100;
+
 /// Unknowns that a sparse factor is made for unasked.
 const LARGE: usize = 400_000;
 
@@ -32,6 +41,7 @@ pub(crate) fn choose(problem: &Problem, h: &Operator, asked: Method) -> Result<(
             Ok((Method::Cholesky, "a curve with many constraints"))
         }
         Method::Auto if problem.space().is_curve() => Ok((Method::Banded, "a curve")),
+        Method::Auto if rows(problem) > CROWD => crowd(problem),
         Method::Auto if waves => Ok((Method::Spectral, "mirrored or periodic axes of uniform stiffness")),
         Method::Auto => sparse_or_levels(problem, h),
         Method::Banded if !problem.space().is_curve() => unfit("it is for curves"),
@@ -45,10 +55,52 @@ fn rows(problem: &Problem) -> usize {
     problem.rows().len() / problem.coordinates()
 }
 
+/// For surfaces of so many rows that nothing dense may be made of them.
+fn crowd(problem: &Problem) -> Result<(Method, &'static str), SolveError> {
+    if coarse_enough(problem) {
+        return Ok((Method::Multigrid, "a surface with very many constraints"));
+    }
+    if problem.space().len() * problem.coordinates() > LARGE {
+        let why = "so many constraints on so large a surface need spans that halve often: take a power of two";
+        return Err(SolveError::Method { method: Method::Auto, why });
+    }
+    Ok((Method::Cholesky, "a surface with very many constraints"))
+}
+
+fn coarse_enough(problem: &Problem) -> bool {
+    bpx::coarsest(problem.space()).len() * problem.coordinates() <= COARSEST
+}
+
+/// Refuses dense matrices that are too large for a method's constraints.
+///
+/// # Errors
+/// [`ProblemError::Memory`].
+pub(crate) fn fits(structure: &Structure, method: Method) -> Result<(), ProblemError> {
+    let [m, f, n] = [structure.rows(), structure.functionals.len(), structure.n].map(|v| v as u64);
+    let entries = match method {
+        // The sides of the band's factor, a square, its triangle and the factor of that.
+        Method::Banded if structure.k == 1 && structure.is_separable() => n.saturating_mul(m) + 2 * m * m,
+        Method::Banded => n.saturating_mul(f) + f * f / 2 + m * m,
+        Method::Spectral | Method::Bpx | Method::Wavelet => f * f / 2 + m * m,
+        Method::Multigrid if m <= CYCLES as u64 => f * f / 2 + m * m,
+        _ => 0,
+    };
+    let bytes = entries.saturating_mul(8);
+    if bytes <= MEMORY {
+        return Ok(());
+    }
+    let what = "a dense matrix of this many constraints (solvers multigrid and cholesky make none)";
+    Err(ProblemError::Memory { what, bytes, limit: MEMORY })
+}
+
 /// What a sparse factor gives way to where crowded constraints are too much for it.
 pub(crate) fn spare(problem: &Problem, chosen: Method) -> Option<(Method, &'static str)> {
     let space = problem.space();
     match chosen {
+        Method::Multigrid if space.len() * problem.coordinates() <= LARGE => {
+            Some((Method::Cholesky, "a surface with very many constraints, too uneven for multigrid"))
+        }
+        Method::Cholesky if rows(problem) > CROWD => None,
         Method::Cholesky if space.is_curve() => Some((Method::Banded, "a curve with crowded constraints")),
         Method::Cholesky if bpx::coarsest(space).len() <= bpx::MOST => {
             Some((Method::Bpx, "constraints too crowded for a sparse factor"))

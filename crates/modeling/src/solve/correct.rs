@@ -19,8 +19,9 @@ pub(crate) trait Correct {
         0
     }
 
-    /// How many corrections may follow each other, and what share of the last one counts as progress.
-    fn patience(&self) -> (usize, f64) {
+    /// How many corrections may follow each other, and what share of the last one counts as progress; `met` when all
+    /// hard rows are, up to the tolerance.
+    fn patience(&self, _met: bool) -> (usize, f64) {
         (30, 0.3)
     }
 

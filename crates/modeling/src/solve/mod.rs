@@ -10,6 +10,7 @@ mod bpx;
 pub(crate) mod cholesky;
 mod correct;
 mod cosine;
+mod curving;
 pub(crate) mod cycle;
 mod edges;
 mod green;
@@ -25,6 +26,7 @@ mod spectral;
 mod strip;
 mod thesis;
 mod transfer;
+mod verdict;
 mod wavelet;
 
 pub use method::{Iteration, Method, MethodError, Settings};

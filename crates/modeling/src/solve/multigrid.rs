@@ -26,12 +26,17 @@ pub(crate) struct Multigrid {
     rz: f64,
     goal: f64,
     iterations: usize,
+    /// Iterations of all corrections of a right-hand side.
+    spent: usize,
     r2: Vec<f64>,
     fresh: bool,
 }
 
 /// How much stiffer than H the hard rows are made.
 const RHO: f64 = 100.0;
+
+/// Iterations after which a right-hand side is given up.
+const WORK: usize = 5000;
 
 /// A V-cycle of H alone as the inverse inside projected conjugate gradients: few iterations, but a cycle a row to
 /// prepare.
@@ -99,13 +104,14 @@ impl Multigrid {
             rz: 0.0,
             goal: 0.0,
             iterations: 0,
+            spent: 0,
             r2: Vec::new(),
             fresh: true,
         })
     }
 
     fn finish(&mut self) -> bool {
-        let done = !(self.rz > self.goal && self.rz.is_finite()) || self.iterations >= self.most;
+        let done = !(self.rz > self.goal && self.rz.is_finite()) || self.iterations >= self.most.min(WORK);
         if done {
             for (r, l) in self.l.iter_mut().enumerate() {
                 *l = self.stiffness[r] * (self.structure.apply_row(r, &self.x) - self.r2[r]);
@@ -155,6 +161,7 @@ impl Correct for Multigrid {
         let beta = self.rz / old;
         self.p.iter_mut().zip(&self.z).for_each(|(p, z)| *p = z + beta * *p);
         self.iterations += 1;
+        self.spent += 1;
         self.finish()
     }
 
@@ -166,7 +173,12 @@ impl Correct for Multigrid {
         self.iterations
     }
 
-    fn patience(&self) -> (usize, f64) {
-        (400, 0.98)
+    fn restart(&mut self) {
+        self.spent = 0;
+    }
+
+    fn patience(&self, _met: bool) -> (usize, f64) {
+        // Multipliers come slowly; but where cycles hardly help there is no end to it.
+        if self.spent > WORK { (1, 0.98) } else { (400, 0.98) }
     }
 }

@@ -40,6 +40,10 @@ pub(crate) struct Projected {
     held: Vec<f64>,
     rg: f64,
     goal: f64,
+    /// True where the goal is an energy; then what is recent: r g, oldest first, and what the last step brought.
+    aimed: bool,
+    recent: Vec<f64>,
+    gain: f64,
     /// The smallest r g, halved at least, and when it was reached.
     best: f64,
     best_at: usize,
@@ -51,6 +55,15 @@ pub(crate) struct Projected {
 
 /// Iterations without a halved residual after which rounding has the word.
 const PATIENCE: usize = 2000;
+
+/// Steps by which it is judged how many are to come.
+const RECENT: usize = 8;
+
+/// Where r g falls slower than this, rounding is what keeps it up.
+const SLOWEST: f64 = 0.999;
+
+/// The energy left may be this many times the goal, which is far below what is promised.
+const SLACK: f64 = 10.0;
 
 /// What the next step does.
 enum Pending {
@@ -162,6 +175,9 @@ impl Projected {
             held: Vec::new(),
             rg: 0.0,
             goal: 0.0,
+            aimed: false,
+            recent: Vec::new(),
+            gain: 0.0,
             best: f64::INFINITY,
             best_at: 0,
             iterations: 0,
@@ -171,8 +187,28 @@ impl Projected {
     }
 
     /// Iterates until the squared residual, in the preconditioner's norm, is below `goal`.
+    ///
+    /// That norm is the energy to be gained only if the preconditioner is good; where steps bring little, more of them
+    /// are to come, and the goal is held against all of these.
     pub(crate) fn aim(&mut self, goal: f64) {
         self.goal = goal;
+        self.aimed = true;
+    }
+
+    /// About the energy that is left to be gained: what the last step brought, times the steps to come.
+    pub(crate) fn left(&self) -> f64 {
+        let steps = self.recent.len().saturating_sub(1);
+        if self.rg <= self.noise() || steps == 0 {
+            return self.rg;
+        }
+        let share = (self.rg / self.recent[0]).powf(1.0 / steps as f64);
+        self.rg.max(self.gain) / (1.0 - share.min(SLOWEST))
+    }
+
+    /// The energy that the rounding of the coefficients alone has, about.
+    fn noise(&self) -> f64 {
+        let size = self.x.iter().fold(0.0, |m: f64, v| m.max(v.abs())) * 1e-16;
+        size * size * self.trace
     }
 
     fn len(&self) -> usize {
@@ -262,10 +298,10 @@ impl Projected {
         self.multipliers.fill(0.0);
         self.advance_residual();
         self.p.clone_from(&self.g);
+        self.recent.push(self.rg);
         if self.goal == 0.0 {
-            // On surfaces the rounding of the coefficients alone has about this energy.
-            let size = self.x.iter().fold(0.0, |m: f64, v| m.max(v.abs())) * 1e-16;
-            let noise = if self.h.is_surface() { size * size * self.trace } else { 0.0 };
+            // Curves are refined further than rounding, by residuals of twice the precision.
+            let noise = if self.h.is_surface() { self.noise() } else { 0.0 };
             self.goal = (energy.max(self.rg) * self.tolerance * self.tolerance).max(noise);
         }
         self.finished()
@@ -287,6 +323,9 @@ impl Projected {
 
     fn finished(&self) -> bool {
         let lost = self.iterations > self.best_at + PATIENCE;
+        if self.aimed && self.rg <= self.goal && self.left() > SLACK * self.goal {
+            return lost || self.iterations >= self.most;
+        }
         !(self.rg > self.goal && self.rg.is_finite()) || lost || self.iterations >= self.most
     }
 
@@ -301,6 +340,13 @@ impl Projected {
         self.r.iter_mut().zip(&self.hp).for_each(|(r, h)| *r -= alpha * h);
         let old = self.rg;
         self.advance_residual();
+        if self.aimed {
+            self.gain = alpha * old;
+            if self.recent.len() > RECENT {
+                self.recent.remove(0);
+            }
+            self.recent.push(self.rg);
+        }
         let beta = self.rg / old;
         self.p.iter_mut().zip(&self.g).for_each(|(p, g)| *p = g + beta * *p);
         self.iterations += 1;
@@ -316,6 +362,7 @@ impl Correct for Projected {
         self.iterations = 0;
         self.best = f64::INFINITY;
         self.best_at = 0;
+        self.recent.clear();
         self.pending = Pending::Start { r2: r2.to_vec() };
     }
 

@@ -1,9 +1,10 @@
 //! The stepped solver: blocks one after another, each refined until it no longer moves.
 
-use super::auto::{choose, spare};
+use super::auto::{self, choose, fits, spare};
 use super::banded::{BandGreen, Banded};
 use super::bpx::Bpx;
 use super::correct::Correct;
+use super::curving::Curving;
 use super::green::Green;
 use super::method::{Method, Settings};
 use super::multigrid::{CycleGreen, Multigrid};
@@ -12,10 +13,12 @@ use super::solution::{Residual, Solution};
 use super::sparse::SparseSolver;
 use super::spectral::Spectral;
 use super::thesis::Squared;
+use super::verdict;
 use super::wavelet::WaveletGreen;
 use crate::constraint::curvature;
 use crate::energy::{Operator, Scratch, twofold};
 use crate::system::{Block, Problem, ProblemError, Redundant, Structure};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// Why a problem cannot be solved.
@@ -82,11 +85,13 @@ pub struct Solver {
     why: &'static str,
     /// What a choice by rule gives way to if it does not converge.
     spare: Option<(Method, &'static str)>,
-    h: Arc<Operator>,
+    pub(super) h: Arc<Operator>,
     pub(super) blocks: Vec<(Arc<Structure>, Block)>,
-    notes: Vec<String>,
+    pub(super) notes: Vec<String>,
+    /// Constraints with rows that were left out because they follow from others.
+    pub(super) followers: Vec<usize>,
     /// One a block, kept for other targets.
-    correctors: Vec<Option<Box<dyn Correct>>>,
+    pub(super) correctors: Vec<Option<Box<dyn Correct>>>,
     pub(super) at: (usize, usize),
     /// Unknowns and multipliers of every side, block by block.
     pub(super) sides: Vec<Vec<SideState>>,
@@ -94,7 +99,9 @@ pub struct Solver {
     pub(super) iterations: usize,
     scratch: Scratch,
     pub(super) converged: bool,
+    /// Programs posed for curvature constraints.
     pub(super) newton: usize,
+    pub(super) curving: Option<Curving>,
 }
 
 #[derive(Clone, Debug, Default)]
@@ -113,9 +120,6 @@ pub(crate) enum Stage {
     Finished,
 }
 
-/// Rows for which multigrid prepares a cycle each, and projects; with more it works by multipliers.
-const CYCLES: usize = 100;
-
 impl Solver {
     /// Prepares a solver: blocks, the method's rule, redundant rows. The factors are made in the first step.
     ///
@@ -129,8 +133,12 @@ impl Solver {
         let (blocks, redundant) = problem.blocks(rows)?;
         let h = Arc::new(Operator::new(problem.space(), problem.energy(), problem.stiffness()));
         let (method, why) = choose(&problem, &h, settings.method)?;
+        blocks.iter().try_for_each(|b| fits(&b.structure, method))?;
         let spare = if settings.method == Method::Auto { spare(&problem, method) } else { None };
         let notes = notes(&problem, &redundant);
+        // Those that are missed for good are in the notes.
+        let followers = redundant.iter().filter(|r| r.miss.is_none()).map(|r| r.constraint);
+        let followers: Vec<usize> = followers.collect::<BTreeSet<usize>>().into_iter().collect();
         let sides = fresh_sides(&blocks);
         let blocks: Vec<(Arc<Structure>, Block)> =
             blocks.into_iter().map(|b| (Arc::new(b.structure.clone()), b)).collect();
@@ -144,6 +152,7 @@ impl Solver {
             correctors: (0..blocks.len()).map(|_| None).collect(),
             blocks,
             notes,
+            followers,
             at: (0, 0),
             sides,
             stage: Stage::Residual,
@@ -151,6 +160,7 @@ impl Solver {
             scratch: Scratch::default(),
             converged: true,
             newton: 0,
+            curving: None,
         })
     }
 
@@ -199,7 +209,9 @@ impl Solver {
         }
         let (b, s) = self.at;
         if b >= self.blocks.len() {
-            if self.converged && self.linearise()? {
+            let said = self.notes.len();
+            self.judge();
+            if self.curve(said)? {
                 return self.advance();
             }
             self.stage = Stage::Finished;
@@ -245,7 +257,9 @@ impl Solver {
         let Some(corrector) = self.correctors[b].as_ref() else { return };
         let (dx, dl) = corrector.correction();
         let finite = dx.iter().all(|v| v.is_finite());
-        let (most, progress) = corrector.patience();
+        let allowed = verdict::allowed(self.settings.tolerance, verdict::scale(&self.problem, &self.blocks));
+        let (structure, block) = &self.blocks[b];
+        let targets = &block.sides[s].targets;
         let side = &mut self.sides[b][s];
         let max = |v: &[f64]| v.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
         if finite {
@@ -254,8 +268,8 @@ impl Solver {
         }
         let size = max(&side.x).max(f64::MIN_POSITIVE);
         let change = if finite { max(dx) / size } else { f64::INFINITY };
-        let (structure, block) = &self.blocks[b];
-        let targets = &block.sides[s].targets;
+        let met = verdict::worst(structure, targets, side) <= allowed;
+        let (most, progress) = corrector.patience(met || self.spare.is_some());
         let mut miss = 0.0_f64;
         for r in 0..structure.rows() {
             let soft = structure.give[r] * side.multipliers[r];
@@ -268,7 +282,8 @@ impl Solver {
         side.corrections += 1;
         let last = side.corrections >= most || !finite || stop;
         let settled = change <= 100.0 * self.settings.tolerance && stalled;
-        if (last || stalled) && !enough && change > self.settings.tolerance && !settled {
+        let settled = met && (change <= self.settings.tolerance || settled);
+        if (last || stalled) && !enough && !settled {
             if !stop && self.give_way() {
                 return;
             }
@@ -286,6 +301,10 @@ impl Solver {
             }
         }
         if stop {
+            // Sides that had no turn are zero.
+            self.converged &= self.at.0 >= self.blocks.len() && self.curving.is_none();
+            self.judge();
+            self.judge_curvature();
             self.stage = Stage::Finished;
         }
     }
@@ -303,33 +322,6 @@ impl Solver {
         self.at = (0, 0);
         self.stage = Stage::Residual;
         true
-    }
-
-    /// Newton's step for curvature constraints: rows linear around the shape so far. False when they are met.
-    fn linearise(&mut self) -> Result<bool, SolveError> {
-        let coefficients = self.coefficients();
-        let found = curvature::rows(&self.problem, &coefficients);
-        if found.miss <= self.settings.tolerance.max(1e-12) * found.size {
-            return Ok(false);
-        }
-        self.newton += 1;
-        if self.newton > NEWTON {
-            self.notes.push(format!("a curvature is missed by {:.1e} after {NEWTON} Newton steps", found.miss));
-            self.converged = false;
-            return Ok(false);
-        }
-        for id in found.degenerate {
-            self.notes.push(format!("constraint {id}: the tangent has collapsed, so there is no curvature to ask for"));
-        }
-        let mut rows = self.problem.rows();
-        rows.extend(found.rows);
-        let (blocks, _) = self.problem.blocks(rows)?;
-        self.sides = fresh_sides(&blocks);
-        self.blocks = blocks.into_iter().map(|b| (Arc::new(b.structure.clone()), b)).collect();
-        self.correctors = (0..self.blocks.len()).map(|_| None).collect();
-        self.at = (0, 0);
-        self.stage = Stage::Residual;
-        Ok(true)
     }
 
     /// The coefficients so far, coordinate by coordinate.
@@ -368,10 +360,10 @@ impl Solver {
                 Box::new(green.ok_or_else(|| unfit("it is for curves"))?)
             }
             Method::Cholesky => {
-                let solver = SparseSolver::new(&self.h, structure);
+                let solver = SparseSolver::new(&self.h, structure, energy.free_degree());
                 return Ok(Box::new(solver.ok_or_else(|| unfit("the matrix has no factor"))?));
             }
-            Method::Multigrid if structure.rows() <= CYCLES || space.is_curve() => {
+            Method::Multigrid if structure.rows() <= auto::CYCLES || space.is_curve() => {
                 let green = CycleGreen::new(space, energy, map, &self.h);
                 Box::new(green.ok_or_else(|| unfit("the spans do not halve often enough"))?)
             }
@@ -409,8 +401,10 @@ impl Solver {
         let problem = &self.problem;
         let coefficients = self.coefficients();
         let mut residuals = Residual::all(problem, &problem.rows(), &coefficients);
-        residuals.extend(curvature::rows(problem, &coefficients).misses);
-        Solution::new(
+        residuals.extend(curvature::misses(problem, &coefficients));
+        let asked = self.blocks.iter().any(|b| b.0.rows() > 0);
+        let begun = !asked || self.newton > 0 || self.sides.iter().flatten().any(|s| s.corrections > 0);
+        let solution = Solution::new(
             problem.space().clone(),
             coefficients,
             self.h.clone(),
@@ -419,7 +413,8 @@ impl Solver {
             self.iterations,
             self.converged && self.stage == Stage::Finished,
             self.notes.clone(),
-        )
+        );
+        solution.begun_if(begun)
     }
 }
 
@@ -450,9 +445,6 @@ pub(crate) fn fresh_sides(blocks: &[Block]) -> Vec<Vec<SideState>> {
     };
     blocks.iter().map(of).collect()
 }
-
-/// Newton steps after which curvature constraints are given up.
-const NEWTON: usize = 40;
 
 /// What is left of both equations.
 fn residual(

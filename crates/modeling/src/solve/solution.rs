@@ -30,6 +30,7 @@ pub struct Solution {
     converged: bool,
     notes: Vec<String>,
     adapted: Option<(usize, f64)>,
+    begun: bool,
 }
 
 impl Residual {
@@ -56,12 +57,18 @@ impl Solution {
         converged: bool,
         notes: Vec<String>,
     ) -> Solution {
-        Solution { space, coefficients, h, residuals, method, iterations, converged, notes, adapted: None }
+        Solution { space, coefficients, h, residuals, method, iterations, converged, notes, adapted: None, begun: true }
     }
 
     /// The same, found on some of the functions only, with an estimate of its energy above the least.
     pub(crate) fn adapted(mut self, active: usize, excess: f64) -> Solution {
         self.adapted = Some((active, excess));
+        self
+    }
+
+    /// The same solution; not `begun` where nothing was computed.
+    pub(crate) fn begun_if(mut self, begun: bool) -> Solution {
+        self.begun = begun;
         self
     }
 
@@ -108,6 +115,11 @@ impl Solution {
     /// True when the tolerance was reached.
     pub fn converged(&self) -> bool {
         self.converged
+    }
+
+    /// False where no method could make a first shape: all coefficients are zero, and the notes say why.
+    pub fn begun(&self) -> bool {
+        self.begun
     }
 
     /// Redundant rows and other remarks, a sentence each.

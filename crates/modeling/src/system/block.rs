@@ -232,9 +232,13 @@ impl Problem {
     /// of coefficients). Heights of zero beside others come from sums that cancel. A shape of nothing but zeros has
     /// only its domain to go by.
     fn scale(&self, rows: &[Row]) -> f64 {
+        rows.iter().fold(self.least_scale(), |m: f64, r| m.max(r.target.abs()))
+    }
+
+    /// The size of a shape of nothing but zeros.
+    pub(crate) fn least_scale(&self) -> f64 {
         let side = |a: &crate::axis::Axis| a.domain()[1] - a.domain()[0];
-        let longest = self.space.axes().iter().map(side).fold(0.0, f64::max);
-        rows.iter().fold(NOTHING * longest, |m: f64, r| m.max(r.target.abs()))
+        NOTHING * self.space.axes().iter().map(side).fold(0.0, f64::max)
     }
 
     /// The rows without those that follow from others; `scale` as [`Problem::scale`] says.

@@ -74,8 +74,8 @@ pub enum ProblemError {
     },
 }
 
-/// No problem may need more memory for its coefficients than this.
-const MEMORY: u64 = 8 << 30;
+/// No problem may need more memory than this, for its coefficients or for a dense matrix of its constraints.
+pub(crate) const MEMORY: u64 = 8 << 30;
 
 impl Problem {
     /// Checks everything that can be checked without solving.

@@ -67,6 +67,10 @@ pub(crate) struct Solved {
     pub(crate) energy: f64,
     /// Hard rows that are missed.
     pub(crate) unmet: usize,
+    /// About the energy that more iterations would save.
+    pub(crate) left: f64,
+    /// What rounding makes of energies this size, about.
+    pub(crate) noise: f64,
 }
 
 /// What inactive functions would gain: the energy that each alone would save, about.
@@ -226,6 +230,7 @@ impl Active {
                 // Crowded rows may need more than one correction to be met in full.
                 let size = side.targets.iter().fold(0.0, |m: f64, b| m.max(b.abs()));
                 let before = side.x.clone();
+                let mut left = 0.0;
                 for correction in 0..CORRECTIONS {
                     let miss = |(i, r): (usize, &usize)| {
                         side.targets[*r] - structure.apply_row(i, &side.x) + structure.give[i] * multipliers[i]
@@ -244,10 +249,12 @@ impl Active {
                     solver.begin(&r1, &r2);
                     while !solver.step() {}
                     self.iterations += solver.iterations();
+                    left = solver.left();
                     let (dx, dl) = solver.correction();
                     side.x.iter_mut().zip(dx).for_each(|(x, d)| *x += d);
                     multipliers.iter_mut().zip(dl).for_each(|(l, d)| *l += d);
                 }
+                out.left += left;
                 // Rows that rounding cannot tell from others leave nothing to go by: back, and they wait like the rest.
                 let unclear = |(i, r): &(usize, &usize)| {
                     let miss = side.targets[**r] - structure.apply_row(*i, &side.x);
@@ -263,6 +270,8 @@ impl Active {
                 }
                 side.multipliers.fill(0.0);
                 kept.iter().zip(&multipliers).for_each(|(r, l)| side.multipliers[*r] = *l);
+                let most = side.x.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+                out.noise += 1e-13 * most * most * cover.trace() * all.k as f64;
                 let mut hx = vec![0.0; n];
                 for x in side.x.chunks_exact(n) {
                     cover.times(x, &mut hx, &mut self.scratch);

@@ -13,6 +13,7 @@
 mod active;
 mod cover;
 mod hierarchy;
+mod least;
 mod values;
 
 use super::method::Method;
@@ -76,6 +77,9 @@ pub struct Oracle {
     asleep: BTreeMap<Function, (u8, bool)>,
     last: Solved,
     excess: f64,
+    /// The least energy, where it must be known, and how much closer iterations must come than they need elsewhere.
+    least: Option<f64>,
+    share: f64,
     converged: bool,
 }
 
@@ -111,8 +115,16 @@ const GROWTH: f64 = 0.2;
 const MARGIN: f64 = 0.9;
 /// Share of the gains that a round takes.
 const BULK: f64 = 0.8;
-/// Iterations a round.
-const ITERATIONS: usize = 100;
+/// Iterations of the first round, which has no energy to go by, and of any other.
+const ITERATIONS: [usize; 2] = [100, 5000];
+/// Goals a solution may have, one after the other.
+const GOALS: usize = 4;
+/// The closest that iterations come, as a share of what is needed for square cells.
+const CLOSEST: f64 = 1e-8;
+/// Share of the bound that iterations may leave.
+const SETTLED: f64 = 0.1;
+/// Energies below the least by more than this share of the bound are not to be trusted.
+const BELOW: f64 = 0.01;
 /// Active functions whose squared coefficient is this share of the allowed energy, divided by their number, have
 /// children and neighbours.
 const COUNTS: f64 = 0.05;
@@ -160,17 +172,21 @@ impl Oracle {
             asleep: BTreeMap::new(),
             last: Solved::default(),
             excess: f64::INFINITY,
+            least: None,
+            share: 1.0,
             converged: false,
         })
     }
 
     /// True where the oracle is expected to be faster than all wavelets together to a tolerance of 1e-8: surfaces with
     /// at least 3000 control points a constraint row of a coordinate, 100 where an axis is open; measured from 32 to
-    /// 512 spans. Elsewhere it only reduces data. Curves never: their wavelets are few.
+    /// 512 spans. Elsewhere it only reduces data. Curves never: their wavelets are few; nor surfaces whose cells are
+    /// far from square: there the least energy is found in full, to compare with.
     pub fn pays(problem: &Problem) -> bool {
         let rows = problem.rows().len() as f64 / problem.coordinates() as f64;
         let open = problem.space().axes().iter().any(|a| a.boundary() == Boundary::Open);
-        !problem.space().is_curve() && rows * PAYS[usize::from(open)] <= problem.space().len() as f64
+        let square = least::cells_are_square(problem.space());
+        square && !problem.space().is_curve() && rows * PAYS[usize::from(open)] <= problem.space().len() as f64
     }
 
     /// Does one round; `None` when there is nothing left to do.
@@ -205,10 +221,33 @@ impl Oracle {
 
     /// Solves on the active functions to an energy error of about `share` of the bound.
     fn solve(&mut self, share: f64) -> Result<(), SolveError> {
-        let goal = share * self.bound * self.last.energy;
-        let goal = if goal > 0.0 && goal.is_finite() { goal } else { f64::MIN_POSITIVE };
-        self.last = self.active.solve(goal, ITERATIONS).map_err(|constraint| self.degenerate(constraint))?;
+        let known = |energy: f64| energy > 0.0 && energy.is_finite();
+        if !known(self.last.energy) {
+            let first = self.active.solve(f64::MIN_POSITIVE, ITERATIONS[0]);
+            self.last = first.map_err(|constraint| self.degenerate(constraint))?;
+        }
+        // The energy, and with it the goal, is not known before.
+        for _ in 0..GOALS {
+            let goal = share * self.share * self.allowed();
+            if !(goal > 0.0 && goal.is_finite()) {
+                break;
+            }
+            self.last = self.active.solve(goal, ITERATIONS[1]).map_err(|constraint| self.degenerate(constraint))?;
+            if self.is_settled() {
+                break;
+            }
+        }
         Ok(())
+    }
+
+    /// The energy that the solution may have above the least; rounding at least.
+    fn allowed(&self) -> f64 {
+        (self.bound * self.last.energy).max(self.last.noise)
+    }
+
+    /// True where more iterations would change next to nothing.
+    fn is_settled(&self) -> bool {
+        self.last.left <= SETTLED * self.allowed()
     }
 
     fn degenerate(&self, constraint: usize) -> SolveError {
@@ -230,7 +269,10 @@ impl Oracle {
             self.phase = Phase::Grow;
             return Ok(());
         }
-        let allowed = self.bound * self.last.energy;
+        if self.least.is_none() && !least::cells_are_square(self.problem.space()) {
+            self.least = Some(least::energy(&self.problem)?);
+        }
+        let allowed = self.allowed();
         let squares = self.active.squares();
         let mut gains = self.active.gains(self.candidates(&squares, allowed));
         let sum = |gains: &Gains| gains.functions.iter().map(|g| g.1).sum::<f64>();
@@ -241,9 +283,14 @@ impl Oracle {
         let sum = sum(&gains);
         let mut gains = gains.functions;
         gains.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        self.excess = REACH * sum;
+        self.excess = self.least.map_or(REACH * sum + self.last.left, |least| self.last.energy - least);
+        if self.least.is_some() && self.excess > (GROWTH * allowed).max(REACH * sum) && self.share > CLOSEST {
+            // Nobody would gain what is left: it is the iteration's.
+            self.share *= 0.01;
+            return self.grow();
+        }
         let small = self.negligible(&squares, 0.01 * allowed);
-        if REACH * sum > GROWTH * allowed {
+        if self.excess > GROWTH * allowed {
             let mut left = BULK * sum;
             let few = gains.iter().take_while(|g| {
                 let take = left > 0.0;
@@ -263,7 +310,13 @@ impl Oracle {
             self.phase = Phase::Grow;
             return Ok(());
         }
-        self.converged = true;
+        let below = (BELOW * allowed).max(self.last.noise);
+        self.converged = (-below..=allowed).contains(&self.excess);
+        self.excess = self.excess.max(0.0);
+        if !self.converged {
+            self.notes.push("the active functions do not come as near to the least energy as was asked".to_owned());
+            return Ok(());
+        }
         let corner = self.active.corner();
         let mut order: Vec<(f64, Function)> =
             squares.iter().copied().zip(self.active.functions.iter().copied()).skip(corner).collect();
@@ -312,7 +365,7 @@ impl Oracle {
             }
             d.next = usize::midpoint(d.good, d.bad);
         }
-        self.excess = d.grown.1 + self.last.energy - d.grown.0;
+        self.excess = (d.grown.1 + self.last.energy - d.grown.0).max(0.0);
         let close = d.bad - d.good <= 1 + d.order.len() / 100;
         if !over && d.trials < TRIALS && !close {
             self.phase = Phase::Drop(d);

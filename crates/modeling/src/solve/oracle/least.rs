@@ -1,0 +1,35 @@
+//! The least energy of all functions together, where the gains of single ones say too little about it.
+
+use crate::solve::method::{Method, Settings};
+use crate::solve::refine::{SolveError, Solver};
+use crate::system::{Problem, Space};
+
+/// Sides of a cell that differ by this factor are not square any more.
+const SQUARE: f64 = 1.5;
+
+/// True for curves, and surfaces whose cells are about square: there wavelets of unit energy are all that an energy
+/// needs to be known by. Long cells couple many of them, and what one would save alone is a small part of what all
+/// would save.
+pub(super) fn cells_are_square(space: &Space) -> bool {
+    let [s, t] = space.axes() else { return true };
+    (1.0 / SQUARE..=SQUARE).contains(&(s.density() / t.density()))
+}
+
+/// The least energy, soft rows included, by the solver that `auto` picks.
+///
+/// # Errors
+/// [`SolveError`], and [`SolveError::Method`] where it does not converge.
+pub(super) fn energy(problem: &Problem) -> Result<f64, SolveError> {
+    let settings = Settings { tolerance: 1e-9, ..Settings::default() };
+    let full = Solver::new(problem.clone(), settings)?.run()?;
+    if !full.converged() {
+        let why = "its cells are far from square, and the full solution to compare with did not converge";
+        return Err(SolveError::Method { method: Method::Wavelet, why });
+    }
+    let x = full.coefficients();
+    let soft = |row: &crate::constraint::Row| {
+        let value: f64 = row.entries().map(|(c, i, v)| v * x[c][i]).sum();
+        (value - row.target).powi(2) / row.give
+    };
+    Ok(full.energy() + problem.rows().iter().filter(|r| r.give > 0.0).map(soft).sum::<f64>())
+}

@@ -1,0 +1,116 @@
+//! The last word of every solution: each hard row is looked at once more, and missed ones are named.
+
+use super::refine::{SideState, Solver};
+use crate::constraint::{Demand, curvature};
+use crate::system::{Block, Problem, Structure};
+use std::sync::Arc;
+
+/// A row of length 1 may be missed by this share of the size of the shape, whatever the tolerance.
+const MISSED: f64 = 1e-9;
+
+/// Missed constraints that are named.
+const NAMED: usize = 8;
+
+/// The size of the shape, about: the largest target of its linear rows, as [`Problem`] has it for conflicts.
+pub(crate) fn scale(problem: &Problem, blocks: &[(Arc<Structure>, Block)]) -> f64 {
+    let linear = |c: usize| !matches!(problem.constraints()[c].demand, Demand::Curvature(_));
+    let mut scale = problem.least_scale();
+    for side in blocks.iter().flat_map(|b| &b.1.sides) {
+        for (target, c) in side.targets.iter().zip(&side.constraints) {
+            if target.abs() > scale && linear(*c) {
+                scale = target.abs();
+            }
+        }
+    }
+    scale
+}
+
+/// What a row of length 1 may be missed by.
+pub(crate) fn allowed(tolerance: f64, scale: f64) -> f64 {
+    tolerance.max(MISSED) * scale
+}
+
+/// The largest miss of a hard row, of length 1, of one side. NaN counts as infinite.
+pub(crate) fn worst(structure: &Structure, targets: &[f64], side: &SideState) -> f64 {
+    let mut worst = 0.0_f64;
+    for r in (0..structure.rows()).filter(|r| structure.give[*r] == 0.0) {
+        let miss = (targets[r] - structure.apply_row(r, &side.x)).abs();
+        worst = if miss.is_nan() { f64::INFINITY } else { worst.max(miss) };
+    }
+    worst
+}
+
+impl Solver {
+    /// Looks at every hard row of the linear problem: a missed one is named and ends convergence. Curvature has its
+    /// own test.
+    pub(super) fn judge(&mut self) {
+        let scale = scale(&self.problem, &self.blocks);
+        let allowed = allowed(self.settings.tolerance, scale);
+        let within = |((structure, block), states): (&(Arc<Structure>, Block), &Vec<SideState>)| {
+            block.sides.iter().zip(states).all(|(side, state)| worst(structure, &side.targets, state) <= allowed)
+        };
+        let met = self.blocks.iter().zip(&self.sides).all(within);
+        if met && self.followers.is_empty() {
+            return;
+        }
+        // By name: rows that were left out are looked at as well.
+        let coefficients = self.coefficients();
+        let mut missed: Vec<(usize, f64)> = Vec::new();
+        for row in self.problem.rows().iter().filter(|r| r.give == 0.0) {
+            let value: f64 = row.entries().map(|(c, i, v)| v * coefficients[c][i]).sum();
+            let miss = (value - row.target).abs();
+            // What follows from others follows up to their rounding.
+            let follows = self.followers.binary_search(&row.constraint).is_ok();
+            if miss.is_nan() || miss > if follows { 1e2 * allowed } else { allowed } {
+                match missed.last_mut().filter(|m| m.0 == row.constraint) {
+                    Some(m) => m.1 = m.1.max(miss * row.length),
+                    None => missed.push((row.constraint, miss * row.length)),
+                }
+            }
+        }
+        if missed.is_empty() {
+            self.converged &= met;
+            return;
+        }
+        self.converged = false;
+        self.name(missed);
+    }
+
+    /// One note a missed constraint.
+    pub(super) fn name(&mut self, missed: Vec<(usize, f64)>) {
+        let more = missed.len().saturating_sub(NAMED);
+        for (constraint, miss) in missed.into_iter().take(NAMED) {
+            let id = &self.problem.constraints()[constraint].id;
+            self.notes.push(format!("constraint {id} is missed by {miss:.1e}"));
+        }
+        if more > 0 {
+            self.notes.push(format!("{more} more constraints are missed"));
+        }
+    }
+
+    /// The last word on curvature: what is missed is named.
+    pub(super) fn judge_curvature(&mut self) {
+        let coefficients = self.coefficients();
+        let seen = curvature::look(&self.problem, &coefficients);
+        let allowed = self.settings.tolerance.max(MISSED);
+        let length = curvature::length(&self.problem, &coefficients);
+        let mut missed = Vec::new();
+        for s in &seen {
+            match s.miss() {
+                None => {
+                    let id = &self.problem.constraints()[s.constraint].id;
+                    self.notes.push(format!(
+                        "constraint {id}: the tangent has collapsed, so there is no curvature to ask for"
+                    ));
+                    self.converged = false;
+                }
+                Some(miss) if miss.abs() <= allowed * s.unit(length) => {}
+                Some(miss) => missed.push((s.constraint, miss.abs())),
+            }
+        }
+        if !missed.is_empty() {
+            self.converged = false;
+            self.name(missed);
+        }
+    }
+}
