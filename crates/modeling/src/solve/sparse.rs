@@ -36,7 +36,7 @@ struct Loose {
 }
 
 /// A shape of no energy is loose if rows hold it with this share of the largest entry of H, or less.
-const LOOSE: f64 = 1e-9;
+const LOOSE: f64 = 1e-13;
 
 /// Takes the parts along others, orthogonal in the rows' squares, out of one; twice.
 fn clear<'a>(of: &mut Loose, others: impl Iterator<Item = &'a Loose> + Clone) {
