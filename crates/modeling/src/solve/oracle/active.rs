@@ -271,7 +271,7 @@ impl Active {
                 side.multipliers.fill(0.0);
                 kept.iter().zip(&multipliers).for_each(|(r, l)| side.multipliers[*r] = *l);
                 let most = side.x.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
-                out.noise += 1e-13 * most * most * cover.trace() * all.k as f64;
+                out.noise += 1e-12 * most * most * cover.trace() * all.k as f64;
                 let mut hx = vec![0.0; n];
                 for x in side.x.chunks_exact(n) {
                     cover.times(x, &mut hx, &mut self.scratch);
