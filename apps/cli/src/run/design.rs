@@ -201,7 +201,7 @@ fn report(document: &Document, problem: &Problem, solution: &Solution, stages: &
 /// Whether an adaptive solution saves time, or data alone, and by which rule.
 fn pace(problem: &Problem) -> Value {
     let rule =
-        "surfaces of 3000 control points a constraint or more (100 with an open axis); else it reduces data only";
+        "surfaces of about square cells and 3000 control points a constraint (100 with an open axis); else data only";
     json!({ "faster_than_full": Oracle::pays(problem), "rule": rule })
 }
 

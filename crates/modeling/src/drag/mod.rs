@@ -7,7 +7,7 @@
 
 use crate::constraint::{Constraint, Demand};
 use crate::solve::{Settings, SolveError, Solver};
-use crate::system::{Problem, ProblemError};
+use crate::system::Problem;
 use std::collections::BTreeSet;
 
 /// A solved shape whose constraints can be dragged.
@@ -82,7 +82,7 @@ impl Handles {
     /// [`SolveError`].
     pub fn new(problem: Problem, settings: Settings, budget: usize) -> Result<Handles, SolveError> {
         let (solver, coefficients) = cold(&problem, settings)?;
-        let tied = tied(&problem).map_err(SolveError::Problem)?;
+        let tied = solver.tied();
         Ok(Handles { problem, settings, solver, coefficients, columns: Vec::new(), budget, saved: Vec::new(), tied })
     }
 
@@ -201,10 +201,9 @@ impl Handles {
         let Some((problem, coefficients)) = self.saved.pop() else { return Ok(false) };
         let (old, new) = (self.problem.constraints(), problem.constraints());
         if old.len() != new.len() || !old.iter().zip(new).all(|(a, b)| differ_in_targets_only(a, b)) {
-            let tied = tied(&problem).map_err(SolveError::Problem)?;
             self.solver = Solver::new(problem.clone(), self.settings)?;
             self.columns.clear();
-            self.tied = tied;
+            self.tied = self.solver.tied();
         }
         self.problem = problem;
         self.coefficients = coefficients;
@@ -226,11 +225,10 @@ impl Handles {
 
     fn replace(&mut self, constraints: Vec<Constraint>) -> Result<(), DragError> {
         let problem = self.posed(constraints)?;
-        let tied = tied(&problem).map_err(SolveError::Problem)?;
         (self.solver, self.coefficients) = cold(&problem, self.settings)?;
         self.problem = problem;
         self.columns.clear();
-        self.tied = tied;
+        self.tied = self.solver.tied();
         Ok(())
     }
 }
@@ -252,11 +250,4 @@ fn differ_in_targets_only(a: &Constraint, b: &Constraint) -> bool {
         (v, w) => v == w,
     };
     demands && a.id == b.id && a.at == b.at && a.weight == b.weight
-}
-
-/// Constraints that take part in redundant rows, by name.
-fn tied(problem: &Problem) -> Result<BTreeSet<String>, ProblemError> {
-    let (_, redundant) = problem.blocks(problem.rows())?;
-    let all = redundant.iter().flat_map(|r| r.others.iter().copied().chain([r.constraint]));
-    Ok(all.map(|c| problem.constraints()[c].id.clone()).collect())
 }

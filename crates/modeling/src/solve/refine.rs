@@ -90,6 +90,8 @@ pub struct Solver {
     pub(super) notes: Vec<String>,
     /// Constraints with rows that were left out because they follow from others.
     pub(super) followers: Vec<usize>,
+    /// Constraints that take part in rows that were left out.
+    tied: BTreeSet<usize>,
     /// One a block, kept for other targets.
     pub(super) correctors: Vec<Option<Box<dyn Correct>>>,
     pub(super) at: (usize, usize),
@@ -139,6 +141,7 @@ impl Solver {
         // Those that are missed for good are in the notes.
         let followers = redundant.iter().filter(|r| r.miss.is_none()).map(|r| r.constraint);
         let followers: Vec<usize> = followers.collect::<BTreeSet<usize>>().into_iter().collect();
+        let tied = redundant.iter().flat_map(|r| r.others.iter().copied().chain([r.constraint])).collect();
         let sides = fresh_sides(&blocks);
         let blocks: Vec<(Arc<Structure>, Block)> =
             blocks.into_iter().map(|b| (Arc::new(b.structure.clone()), b)).collect();
@@ -153,6 +156,7 @@ impl Solver {
             blocks,
             notes,
             followers,
+            tied,
             at: (0, 0),
             sides,
             stage: Stage::Residual,
@@ -322,6 +326,11 @@ impl Solver {
         self.at = (0, 0);
         self.stage = Stage::Residual;
         true
+    }
+
+    /// Names of the constraints that take part in redundant rows: what holds one holds the others.
+    pub(crate) fn tied(&self) -> BTreeSet<String> {
+        self.tied.iter().map(|c| self.problem.constraints()[*c].id.clone()).collect()
     }
 
     /// The coefficients so far, coordinate by coordinate.

@@ -87,6 +87,7 @@ impl Solver {
         let of = |(i, c): (usize, &usize)| (*c, column.x[i * n..][..n].to_vec());
         Ok(Some(self.blocks[b].1.sides[s].coordinates.iter().enumerate().map(of).collect()))
     }
+
     /// Block, side and row of the target that a constraint has for a coordinate.
     fn row_of(&self, number: usize, coordinate: usize) -> Option<(usize, usize, usize)> {
         self.blocks.iter().enumerate().find_map(|(b, (structure, block))| {

@@ -144,15 +144,14 @@ pub(super) fn open_corners(kernel: &LightKernel, cell: &Cell) -> Vec<[f64; 2]> {
 
 /// Share of an element that is not inside of something, from how many of its points and corners are not: where all
 /// points are alike, a corner that is not is worth a part of a point.
-fn share_of(open: usize, points: usize, shape: CellShape, open_corners: impl FnOnce() -> usize) -> f64 {
-    let corner = 0.25 / points as f64;
-    if open == points {
-        1.0 - corner * (corners(shape).len() - open_corners()) as f64
-    } else if open == 0 {
-        corner * open_corners() as f64
-    } else {
-        open as f64 / points as f64
+/// Beside it the corners that are not, if they were looked at.
+fn share_of(kernel: &LightKernel, cell: &Cell, open: usize, points: usize) -> (f64, Vec<[f64; 2]>) {
+    if open != 0 && open != points {
+        return (open as f64 / points as f64, Vec::new());
     }
+    let (corner, tips) = (0.25 / points as f64, open_corners(kernel, cell));
+    let closed = corners(cell.shape).len() - tips.len();
+    (if open == 0 { corner * tips.len() as f64 } else { 1.0 - corner * closed as f64 }, tips)
 }
 
 /// A misfit below this many of its standard deviations is taken for scatter.
@@ -221,7 +220,7 @@ pub(super) fn fit(
         let grid = Grid::of(basis, cell.key);
         let points = grid.points.len() as f64;
         let open = grid.points.iter().filter(|x| !is_buried(**x)).count();
-        let lit = share_of(open, grid.points.len(), cell.shape, || open_corners(kernel, cell).len());
+        let (lit, _) = share_of(kernel, cell, open, grid.points.len());
         let coefficients = vec![0.0; groups * n];
         return Fit { coefficients, misfit: zero.clone(), scatter: zero, lit, work: [points, 0.0], known: None };
     }
@@ -302,10 +301,9 @@ pub(super) fn fit(
     let dark = |q: usize| (0..groups).all(|g| values[g * count + q] == [0.0; 2]) && is_buried(grid.points[q]);
     let lit: Vec<bool> = (0..count).map(|q| !dark(q)).collect();
     let alive = lit.iter().filter(|l| **l).count();
-    let share = share_of(alive, count, cell.shape, || open_corners(kernel, cell).len());
+    let (share, tips) = share_of(kernel, cell, alive, count);
     if alive == 0 {
         // all that sticks out is a corner or two
-        let tips = open_corners(kernel, cell);
         let (cut, found) = (exact(&mut view, &mut tips.iter().copied(), tips.len()), by_rays(&tips, None));
         let values: Vec<f64> = found.iter().zip(&cut).map(|(f, cut)| 0.5 * (f[0] + f[1]) + cut).collect();
         for values in values.chunks(tips.len().max(1)).take(groups) {

@@ -22,6 +22,8 @@ pub(crate) struct ExactDirect {
     kept: Arc<Kept>,
     /// Whether a leaf is penumbra.
     marked: Vec<bool>,
+    /// Whether its slopes may have been lowered, by channel.
+    lowered: Vec<[bool; 3]>,
 }
 
 impl ExactDirect {
@@ -42,7 +44,8 @@ impl ExactDirect {
                 .sum()
         };
         let marked = (0..solution.forest().len()).map(|n| missed(n) > allowed).collect();
-        Some(ExactDirect { lamps, kept, marked })
+        let lowered = positive::may_be_lowered(solution.forest(), solution.coefficients());
+        Some(ExactDirect { lamps, kept, marked, lowered })
     }
 
     /// Whether direct light is read exactly on a leaf.
@@ -78,7 +81,7 @@ impl ExactDirect {
             fitted_mean += *exitance * own[0];
         }
         // where slopes were lowered, what was fitted is not in the sum any more: the mean still is
-        let lowered = positive::may_be_lowered(forest, leaf, solution.coefficients());
+        let lowered = self.lowered[leaf.index()];
         let present = solution.inside(leaf, x);
         let mean = solution.coefficients()[leaf.index() * forest.stride()];
         Rgb(std::array::from_fn(|c| {

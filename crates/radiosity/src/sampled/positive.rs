@@ -1,7 +1,8 @@
 //! Light is never negative: where scatter or the edge of a shadow tilts an element's function below zero, its slopes
 //! are lowered until its darkest corner is dark. The mean stays as it is.
 
-use ondelette_compress::{Forest, NodeId};
+use ondelette_compress::Forest;
+use ondelette_compress::forest::Node;
 use ondelette_wavelet::cell::CellShape;
 
 /// Values of the functions of second order at the corners of a square and a triangle.
@@ -50,13 +51,18 @@ pub(super) fn keep_positive(forest: &Forest, irradiance: &mut [[f64; 3]]) {
 /// A corner darker than this share of the mean may have been raised to 0.
 const DARK: f64 = 1e-5;
 
-/// Whether [`keep_positive`] may have lowered the slopes of a leaf, by channel.
-pub(super) fn may_be_lowered(forest: &Forest, leaf: NodeId, irradiance: &[[f64; 3]]) -> [bool; 3] {
-    let basis = forest.basis_of(leaf);
-    if !basis.is_nested() || basis.order() != 2 {
-        return [false; 3];
-    }
-    let own = &irradiance[leaf.index() * forest.stride()..][..basis.len()];
-    let corners = &at_corners(forest)[usize::from(basis.shape() == CellShape::Triangle)];
-    std::array::from_fn(|c| darkest(own, corners, c) < DARK * own[0][c])
+/// Whether [`keep_positive`] may have lowered the slopes of leaves, by channel; nothing of other nodes. Cost linear in
+/// the nodes.
+pub(super) fn may_be_lowered(forest: &Forest, irradiance: &[[f64; 3]]) -> Vec<[bool; 3]> {
+    let corners = at_corners(forest);
+    let of = |(n, node): (usize, &Node)| {
+        let basis = forest.basis(node.cell.shape);
+        if node.first_child != 0 || !basis.is_nested() || basis.order() != 2 {
+            return [false; 3];
+        }
+        let own = &irradiance[n * forest.stride()..][..basis.len()];
+        let corners = &corners[usize::from(node.cell.shape == CellShape::Triangle)];
+        std::array::from_fn(|c| darkest(own, corners, c) < DARK * own[0][c])
+    };
+    forest.nodes().iter().enumerate().map(of).collect()
 }
