@@ -149,9 +149,9 @@ impl Ledger {
         ledger
     }
 
-    /// (absorbed + lost + escaped - emitted) / emitted, channels summed: 0 when the ledger closes.
+    /// (absorbed + lost + escaped - emitted) / emitted, channels summed: 0 when the ledger closes, as in the dark.
     pub fn closure(&self) -> f64 {
-        let out = self.absorbed + self.lost_on_backs + self.escaped;
-        (out - self.emitted).sum() / self.emitted.sum()
+        let astray = (self.absorbed + self.lost_on_backs + self.escaped - self.emitted).sum();
+        if astray == 0.0 { 0.0 } else { astray / self.emitted.sum() }
     }
 }

@@ -265,8 +265,7 @@ impl Sampled {
 
     /// Residual at which a solve ends: no finer than the present error needs, which is refined anyway.
     fn wanted(&self) -> f64 {
-        let tolerance = self.settings.error.max(0.3 * self.error.min(0.3));
-        0.1 * tolerance / self.amplification
+        0.1 * self.settings.error.max(self.precision) / self.amplification
     }
 
     /// Residual relative to the whole irradiance.

@@ -3,7 +3,7 @@
 //! Where nothing stands between, the light is smooth: interpolation at Gauss points, judged at test points. Where
 //! something may, it has edges: least squares over a fine grid, judged by its own residuals.
 
-use super::lamps::{Crowded, Lamps, Seen, on_cell};
+use super::lamps::{self, Crowded, Lamps, Seen, on_cell};
 use super::plan::{FLOOR, MEAN_OF_SCATTER};
 use crate::kernel::LightKernel;
 use crate::visible::View;
@@ -160,6 +160,9 @@ const SIGNIFICANT: f64 = 1.0;
 /// Share of a dark element that a lit corner speaks for: half of what lies between the outer points and the rim.
 const BESIDE: f64 = 1.0 / 16.0;
 
+/// Where this share of all light, or less, can come to an element, the lamps left to rays have so much of the rays.
+const DIM: f64 = 0.1;
+
 /// What a fit found out on an element, for fits with more rays to go on from.
 #[derive(Clone, Debug)]
 pub(super) struct Known {
@@ -167,19 +170,20 @@ pub(super) struct Known {
     groups: Box<[u8]>,
     /// What is cut out exactly, at the points of the grid, and what rays found, of both halves: `[group][point]`.
     found: Box<[[f32; 3]]>,
-    /// What is left to rays, and how many of a point there were.
+    /// What is left to rays, how many of a point there were, and what shares are shares of: see [`Seen::whole`].
     crowded: Box<[Crowded]>,
     rays: f64,
+    whole: f64,
 }
 
 impl Known {
-    fn of(cut: &[f64], found: &[[f64; 2]], points: usize, crowded: &[Crowded], rays: f64) -> Self {
+    fn of(cut: &[f64], found: &[[f64; 2]], points: usize, crowded: &[Crowded], [rays, whole]: [f64; 2]) -> Self {
         let both = |k: usize| [cut[k] as f32, found[k][0] as f32, found[k][1] as f32];
         let own = |g: usize| (g * points..(g + 1) * points).map(both);
         let groups: Box<[u8]> =
             (0..cut.len() / points).filter(|g| own(*g).any(|v| v != [0.0; 3])).map(|g| g as u8).collect();
         let found = groups.iter().flat_map(|g| own(usize::from(*g))).collect();
-        Known { groups, found, crowded: crowded.into(), rays }
+        Known { groups, found, crowded: crowded.into(), rays, whole }
     }
 
     /// What was cut out and found, of so many groups and points.
@@ -212,7 +216,8 @@ pub(super) fn fit(
     let basis = forest.basis(cell.shape);
     let n = basis.len();
     let seen = if known.is_some() { Seen::default() } else { lamps.seen_by(kernel, cell) };
-    let crowded = known.map_or(&seen.crowded[..], |k| &k.crowded);
+    let (crowded, whole) = known.map_or((&seen.crowded[..], seen.whole), |k| (&k.crowded, k.whole));
+    let sums = lamps::sums(crowded);
     let element = kernel.element(cell);
     let is_buried = |x: [f64; 2]| kernel.is_buried(cell.root as usize, element.point(x));
     let zero = vec![0.0; groups];
@@ -224,23 +229,25 @@ pub(super) fn fit(
         let coefficients = vec![0.0; groups * n];
         return Fit { coefficients, misfit: zero.clone(), scatter: zero, lit, work: [points, 0.0], known: None };
     }
+    // a fit that goes on knows the lamps at its points only
+    let once_more = || known.map(|_| lamps.seen_by(kernel, cell));
     let mut view = View::new(kernel.occluders().tolerance());
     // at points, `[group][point]`
-    let exact = |view: &mut View, points: &mut dyn Iterator<Item = [f64; 2]>, count: usize| {
+    let exact = |view: &mut View, seen: &Seen, points: &mut dyn Iterator<Item = [f64; 2]>, count: usize| {
         let mut values = vec![0.0; groups * count];
         let mut out = vec![0.0; groups];
         for (q, local) in points.enumerate() {
             let x = element.point(local);
             out.fill(0.0);
             if !kernel.is_covered(cell.root as usize, x) {
-                lamps.exact(kernel, view, &seen, (x, element.normal()), &mut out);
+                lamps.exact(kernel, view, seen, (x, element.normal()), &mut out);
             }
             (0..groups).for_each(|g| values[g * count + q] = out[g]);
         }
         values
     };
     // what rays find there, of both halves; those that were drawn count, too
-    let by_rays = |points: &[[f64; 2]], before: Option<(f64, Vec<[f64; 2]>)>| {
+    let by_rays = |points: &[[f64; 2]], rays: f64, before: Option<(f64, Vec<[f64; 2]>)>| {
         let (drawn, mut values) = before.unwrap_or_else(|| (0.0, vec![[0.0; 2]; groups * points.len()]));
         let fresh = (rays - drawn).max(0.0);
         if fresh == 0.0 {
@@ -255,7 +262,7 @@ pub(super) fn fit(
             }
             out.fill([0.0; 2]);
             let key = seed::combine(seed::combine(cell.key, q as u64), drawn.to_bits());
-            lamps.by_rays(kernel, (crowded, fresh), (cell.root as usize, x, element.normal()), key, &mut out);
+            lamps.by_rays(kernel, (crowded, &sums, fresh), (cell.root as usize, x, element.normal()), key, &mut out);
             for (g, out) in out.iter().enumerate() {
                 (0..2).for_each(|h| values[g * points.len() + q][h] += out[h] * (fresh / rays));
             }
@@ -269,7 +276,7 @@ pub(super) fn fit(
         let tests = cell.shape.test_points();
         let fitted = analysis.points.len();
         let count = fitted + tests.len();
-        let values = exact(&mut view, &mut analysis.points.iter().chain(&tests).copied(), count);
+        let values = exact(&mut view, &seen, &mut analysis.points.iter().chain(&tests).copied(), count);
         let mut functions = [0.0; 36];
         for values in values.chunks(count) {
             let own = analysis.coefficients(&values[..fitted]);
@@ -289,14 +296,20 @@ pub(super) fn fit(
     let count = grid.points.len();
     let (cut, before) = match known.map(|k| (k.rays, k.values(groups, count))) {
         Some((rays, (cut, found))) => (cut, Some((rays, found))),
-        None => (exact(&mut view, &mut grid.points.iter().copied(), count), None),
+        None => (exact(&mut view, &seen, &mut grid.points.iter().copied(), count), None),
     };
-    let found = by_rays(&grid.points, before);
+    // where those that are cut out are hidden, the rays go by what the others may bring
+    let open: f64 =
+        lamps.groups.iter().zip(cut.chunks(count)).map(|(g, cut)| g.1.sum() * cut.iter().sum::<f64>()).sum();
+    let left = sums.last().copied().unwrap_or(0.0);
+    let bright = left + if whole > 0.0 { open / (count as f64 * whole) } else { 0.0 };
+    let rays = if left > 0.0 { rays * (DIM / bright).max(1.0) } else { rays };
+    let found = by_rays(&grid.points, rays, before);
     let values: Vec<[f64; 2]> = found.iter().zip(&cut).map(|(found, cut)| found.map(|f| f + cut)).collect();
     let fresh = rays - known.map_or(0.0, |k| k.rays);
     let work = [seen.work(), crowded.iter().map(|c| fresh * f64::from(c.1)).sum()].map(|w: f64| w * count as f64);
     let doubt = if seen.is_crowded() || !crowded.is_empty() { lamps.doubt } else { 1.0 };
-    let known = (!crowded.is_empty()).then(|| Known::of(&cut, &found, count, crowded, rays));
+    let known = (!crowded.is_empty()).then(|| Known::of(&cut, &found, count, crowded, [rays, whole]));
     // where no lamp shines it may be dark inside of something
     let dark = |q: usize| (0..groups).all(|g| values[g * count + q] == [0.0; 2]) && is_buried(grid.points[q]);
     let lit: Vec<bool> = (0..count).map(|q| !dark(q)).collect();
@@ -304,7 +317,9 @@ pub(super) fn fit(
     let (share, tips) = share_of(kernel, cell, alive, count);
     if alive == 0 {
         // all that sticks out is a corner or two
-        let (cut, found) = (exact(&mut view, &mut tips.iter().copied(), tips.len()), by_rays(&tips, None));
+        let once_more = once_more();
+        let seen = once_more.as_ref().unwrap_or(&seen);
+        let (cut, found) = (exact(&mut view, seen, &mut tips.iter().copied(), tips.len()), by_rays(&tips, rays, None));
         let values: Vec<f64> = found.iter().zip(&cut).map(|(f, cut)| 0.5 * (f[0] + f[1]) + cut).collect();
         for values in values.chunks(tips.len().max(1)).take(groups) {
             let mean = values.iter().sum::<f64>() / tips.len() as f64;
@@ -313,20 +328,25 @@ pub(super) fn fit(
         coefficients.resize(groups * n, 0.0);
         return Fit { coefficients, misfit: zero.clone(), scatter: zero, lit: share, work, known: None };
     }
+    // what rays may have failed to find, and the groups to which there are too few to tell shape from scatter
+    let overlooked = lamps.overlooked(crowded, whole, rays * count as f64);
+    let overlooked: Vec<f32> = overlooked.into_iter().map(|o| o as f32).collect();
+    let sparse: Vec<bool> = lamps.rays_to_groups(crowded, 0.5 * rays).iter().map(|r| *r > 0.0 && *r < 1.0).collect();
     if values.iter().all(|v| *v == [0.0; 2]) {
         // in shadow, but for what may stick out of it between the points and the rim
-        let rim = corners(cell.shape);
-        let (cut, found) = (exact(&mut view, &mut rim.iter().copied(), rim.len()), by_rays(rim, None));
+        let (rim, once_more) = (corners(cell.shape), once_more());
+        let seen = once_more.as_ref().unwrap_or(&seen);
+        let (cut, found) = (exact(&mut view, seen, &mut rim.iter().copied(), rim.len()), by_rays(rim, rays, None));
         let rim_values = |g: usize| (0..rim.len()).map(move |q| g * rim.len() + q);
         let beside = |g: usize| rim_values(g).map(|k| 0.5 * (found[k][0] + found[k][1]) + cut[k]).sum::<f64>();
         let misfit = (0..groups).map(|g| (BESIDE * beside(g)) as f32).collect();
-        return Fit { coefficients: vec![0.0; groups * n], misfit, scatter: zero, lit: share, work, known };
+        return Fit { coefficients: vec![0.0; groups * n], misfit, scatter: overlooked, lit: share, work, known };
     }
     let part = if alive == count { None } else { Some(grid.part(&lit, n)) };
     let matrix = part.as_ref().unwrap_or(&grid.matrix);
     let freedom = alive.saturating_sub(n).max(1) as f64;
     let alive = alive as f64;
-    for values in values.chunks(count) {
+    for (g, values) in values.chunks(count).enumerate() {
         let own: Vec<[f64; 2]> = matrix
             .chunks(count)
             .map(|row| row.iter().zip(values).fold([0.0; 2], |sum, (m, v)| [sum[0] + m * v[0], sum[1] + m * v[1]]))
@@ -347,7 +367,7 @@ pub(super) fn fit(
         let mut scattered = (square * n as f64 / alive).sqrt();
         let found = if square == 0.0 {
             missed / (alive * freedom).sqrt()
-        } else if said > SIGNIFICANT * certainty {
+        } else if said > SIGNIFICANT * certainty && !sparse[g] {
             root
         } else {
             // what scatter may hide, less what it would pretend: more rays tell
@@ -355,7 +375,7 @@ pub(super) fn fit(
             0.0
         };
         misfit.push((doubt * found) as f32);
-        scatter.push((doubt * scattered) as f32);
+        scatter.push(((doubt * scattered) as f32).hypot(overlooked[g]));
     }
     Fit { coefficients, misfit, scatter, lit: share, work, known }
 }

@@ -1,7 +1,7 @@
 //! Direct light read exactly: where a fitted function blurs the edge of a shadow, the light of the lamps is looked
 //! up at the very point instead.
 
-use super::lamps::Lamps;
+use super::lamps::{self, Lamps};
 use super::{Kept, positive};
 use crate::kernel::LightKernel;
 use crate::rgb::Rgb;
@@ -68,7 +68,8 @@ impl ExactDirect {
             let mut exact = vec![0.0; groups.len()];
             self.lamps.exact(kernel, &mut view, &seen, (point, normal), &mut exact);
             values.iter_mut().zip(exact).for_each(|(v, exact)| *v = [exact; 2]);
-            self.lamps.by_rays(kernel, (&seen.crowded, RAYS), (side, point, normal), key, &mut values);
+            let sums = lamps::sums(&seen.crowded);
+            self.lamps.by_rays(kernel, (&seen.crowded, &sums, RAYS), (side, point, normal), key, &mut values);
         }
         let basis = forest.basis_of(leaf);
         let mut functions = [0.0; 36];

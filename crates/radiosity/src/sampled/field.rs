@@ -1,6 +1,7 @@
 //! The light that rays read.
 
-use super::gather::{MOST, Ray};
+use super::gather::MOST;
+use super::rays::Ray;
 use ondelette_compress::forest::Node;
 use ondelette_compress::{Forest, NodeId};
 use ondelette_wavelet::cell::CellShape;
@@ -59,18 +60,19 @@ impl<'a> Field<'a> {
 
     /// What a ray meets.
     pub(super) fn met(&self, ray: &Ray) -> [f64; 3] {
-        if ray.leaf == Ray::NOWHERE {
+        let leaf = ray.leaf();
+        if leaf == Ray::NO_LEAF {
             return [0.0; 3];
         }
-        let [s, t] = ray.to.map(f64::from);
-        if let Some([a, b, c, d]) = self.bilinear.get(ray.leaf as usize) {
+        let [s, t] = ray.to();
+        if let Some([a, b, c, d]) = self.bilinear.get(leaf as usize) {
             let st = s * t;
             return std::array::from_fn(|k| a[k] + b[k] * s + c[k] * t + d[k] * st);
         }
-        let basis = self.forest.basis(self.forest.node(NodeId(ray.leaf)).cell.shape);
+        let basis = self.forest.basis(self.forest.node(NodeId(leaf)).cell.shape);
         let mut values = [0.0; MOST];
         basis.eval([s, t], &mut values);
-        let own = &self.coefficients[ray.leaf as usize * self.forest.stride()..][..basis.len()];
+        let own = &self.coefficients[leaf as usize * self.forest.stride()..][..basis.len()];
         let mut sum = [0.0; 3];
         for (c, v) in own.iter().zip(&values) {
             (0..3).for_each(|k| sum[k] += c[k] * v);

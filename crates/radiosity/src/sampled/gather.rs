@@ -9,6 +9,7 @@
 use super::direct;
 use super::field::Field;
 use super::points::{self, Grain, Point, strata};
+use super::rays::{Ray, Rays};
 use super::verdict::Verdict;
 use crate::kernel::LightKernel;
 use ondelette_compress::{Forest, NodeId};
@@ -21,22 +22,6 @@ use std::ops::Range;
 pub(super) const MOST: usize = 36;
 /// Points of an element that is not coarse.
 const FINE_POINTS: usize = 16;
-/// One sample of a row: where on a leaf it arrives.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Ray {
-    /// Leaf coordinates of its end.
-    pub(super) to: [f32; 2],
-    /// The leaf met, or [`Ray::NOWHERE`].
-    pub(super) leaf: u32,
-    /// Index of the point that it starts from.
-    pub(super) point: u32,
-}
-
-impl Ray {
-    /// The leaf of a ray that meets nothing, or a black back.
-    pub(super) const NOWHERE: u32 = u32::MAX;
-}
-
 /// An element that gathers.
 #[derive(Clone, Debug)]
 pub(super) struct Gather {
@@ -48,9 +33,9 @@ pub(super) struct Gather {
     lit: Vec<bool>,
     /// Directions drawn at every point, in each half.
     pub(super) drawn: u32,
-    /// The first samples of each half, and the others.
-    first: [Vec<Ray>; 2],
-    others: [Vec<Ray>; 2],
+    /// The first samples of every point, and the others.
+    first: Rays,
+    others: Rays,
     /// Order of the functions in use.
     pub(super) order: usize,
     /// Values at the points to coefficients of the functions in use, `[function][point]`.
@@ -121,15 +106,15 @@ impl Gather {
         self.lit.iter().all(|l| *l)
     }
 
-    /// Of known parts: samples of the first half (those that iterations use, the others) and of the second.
-    pub(super) fn of_parts(node: NodeId, points: Vec<Point>, lit: Vec<bool>, drawn: u32, parts: [Vec<Ray>; 4]) -> Self {
-        let [a, b, c, d] = parts;
-        Gather { node, points, lit, drawn, first: [a, c], others: [b, d], order: 1, fit: Vec::new() }
+    /// Of known parts: the first samples, and the others.
+    pub(super) fn of_parts(node: NodeId, points: Vec<Point>, lit: Vec<bool>, drawn: u32, parts: [Rays; 2]) -> Self {
+        let [first, others] = parts;
+        Gather { node, points, lit, drawn, first, others, order: 1, fit: Vec::new() }
     }
 
     /// Its samples, as [`Gather::of_parts`] takes them.
-    pub(super) fn parts(&self) -> [&[Ray]; 4] {
-        [&self.first[0], &self.others[0], &self.first[1], &self.others[1]]
+    pub(super) fn parts(&self) -> [&Rays; 2] {
+        [&self.first, &self.others]
     }
 
     /// Its points, and whether they are not inside of something.
@@ -144,7 +129,7 @@ impl Gather {
 
     /// As if all its samples were stored, with those that are not in `cast`.
     pub(super) fn completed(&self, cast: Cast) -> Gather {
-        Gather { others: cast.rays, ..self.clone() }
+        Gather { others: Rays::of_halves(cast.rays), ..self.clone() }
     }
 
     /// Points.
@@ -159,14 +144,14 @@ impl Gather {
 
     /// Samples beyond the first that are not stored.
     pub(super) fn missing(&self, gather: u32) -> Option<Draw> {
-        let stored = !self.others[0].is_empty() || self.drawn <= Self::FIRST;
+        let stored = !self.others.is_empty() || self.drawn <= Self::FIRST;
         let all = Draw { gather, points: 0..self.points(), directions: Self::FIRST..self.drawn };
         if stored { None } else { Some(all) }
     }
 
     /// Forgets the samples beyond the first.
     pub(super) fn forget_others(&mut self) {
-        self.others = Default::default();
+        self.others = Rays::default();
     }
 
     /// Takes drawn samples.
@@ -175,17 +160,16 @@ impl Gather {
             self.lit[p as usize] |= open;
         }
         let early = (Self::FIRST.saturating_sub(draw.directions.start) as usize).min(draw.directions.len());
-        for (h, rays) in cast.rays.into_iter().enumerate() {
-            let directions = rays.len() / draw.points.len().max(1);
-            // not a byte more than is counted
-            let first = early * (rays.len() / directions.max(1));
-            self.first[h].reserve_exact(first);
-            self.others[h].reserve_exact(rays.len() - first);
-            for ray in rays.chunks(directions.max(1)) {
-                self.first[h].extend_from_slice(&ray[..early]);
-                self.others[h].extend_from_slice(&ray[early..]);
-            }
-        }
+        let each = cast.rays[0].len() / draw.points.len().max(1);
+        // more directions of all points, or all directions of new ones
+        let known = if draw.directions.start > 0 { draw.points.end } else { draw.points.start } as usize;
+        let points = self.points.len();
+        let fresh = |half: usize, p: usize| match p.checked_sub(draw.points.start as usize) {
+            Some(k) if k < draw.points.len() => &cast.rays[half][k * each..(k + 1) * each],
+            _ => &[],
+        };
+        self.first.join(known, points, |half, p| &fresh(half, p)[..early.min(fresh(half, p).len())]);
+        self.others.join(known, points, |half, p| &fresh(half, p)[early.min(fresh(half, p).len())..]);
         self.drawn = self.drawn.max(draw.directions.end);
     }
 
@@ -244,50 +228,26 @@ impl Gather {
 
     /// Follows rays whose leaf was split since.
     pub(super) fn relocate(&mut self, forest: &Forest) {
-        for rays in self.first.iter_mut().chain(&mut self.others) {
-            relocate(forest, rays);
-        }
+        self.first.relocate(forest);
+        self.others.relocate(forest);
     }
 
     /// Hands its points and samples to gathers of the children of its node; these get more points, too, for which
     /// samples are still to be drawn: their first index is returned beside each child.
     pub(super) fn split(&self, forest: &Forest) -> Vec<(Gather, u32)> {
         let shape = forest.node(self.node).cell.shape;
-        let mut place = vec![(0, 0); self.points.len()];
-        let mut children: Vec<Gather> = (0..shape.arity())
-            .map(|c| {
-                let mut child = Gather::new(forest, forest.child(self.node, c), Grain::Coarse);
-                child.points.clear();
-                child.lit.clear();
-                child.drawn = self.drawn;
-                child
-            })
-            .collect();
-        for ((point, lit), place) in self.points.iter().zip(&self.lit).zip(&mut place) {
-            let (c, at) = shape.descend(point.at);
-            *place = (c, children[c].points.len() as u32);
-            children[c].points.push(Point { at, ..*point });
-            children[c].lit.push(*lit);
-        }
-        for h in 0..2 {
-            for ray in &self.first[h] {
-                let (c, point) = place[ray.point as usize];
-                children[c].first[h].push(Ray { point, ..*ray });
-            }
-            for ray in &self.others[h] {
-                let (c, point) = place[ray.point as usize];
-                children[c].others[h].push(Ray { point, ..*ray });
-            }
-        }
-        children
-            .into_iter()
-            .map(|mut child| {
-                child.first.iter_mut().chain(&mut child.others).for_each(Vec::shrink_to_fit);
-                let known = child.points();
-                child.add_points(forest, 1);
-                (child, known)
-            })
-            .collect()
+        let places: Vec<(usize, [f64; 2])> = self.points.iter().map(|point| shape.descend(point.at)).collect();
+        let child = |c: usize| {
+            let chosen: Vec<usize> = (0..places.len()).filter(|&p| places[p].0 == c).collect();
+            let points = chosen.iter().map(|&p| Point { at: places[p].1, ..self.points[p] }).collect();
+            let lit = chosen.iter().map(|&p| self.lit[p]).collect();
+            let parts = [&self.first, &self.others].map(|rays| rays.of(&chosen, places.len()));
+            let mut child = Gather::of_parts(forest.child(self.node, c), points, lit, self.drawn, parts);
+            let known = child.points();
+            child.add_points(forest, 1);
+            (child, known)
+        };
+        (0..shape.arity()).map(child).collect()
     }
 
     /// Whether it has so few points that more of them are worth more than smaller elements.
@@ -304,22 +264,23 @@ impl Gather {
 
     /// Values at the points from one half of the samples.
     fn values(&self, radiosity: &Field<'_>, half: usize, all: bool, out: &mut [[f64; 3]]) {
-        out.fill([0.0; 3]);
-        let mut add = |rays: &[Ray]| {
-            for ray in rays {
-                let b = radiosity.met(ray);
-                let sum = &mut out[ray.point as usize];
-                (0..3).for_each(|c| sum[c] += b[c]);
-            }
-        };
-        add(&self.first[half]);
-        let mut directions = self.drawn.min(Self::FIRST);
-        if all {
-            add(&self.others[half]);
-            directions = self.drawn;
-        }
+        let points = self.points.len();
+        let directions = if all { self.drawn } else { self.drawn.min(Self::FIRST) };
         let share = 1.0 / f64::from(directions.max(1));
-        out.iter_mut().flatten().for_each(|v| *v *= share);
+        for (p, out) in out.iter_mut().enumerate() {
+            let mut sum = [0.0; 3];
+            let mut add = |rays: &[Ray]| {
+                for ray in rays {
+                    let b = radiosity.met(ray);
+                    (0..3).for_each(|c| sum[c] += b[c]);
+                }
+            };
+            add(self.first.at(half, p, points));
+            if all {
+                add(self.others.at(half, p, points));
+            }
+            *out = sum.map(|s| s * share);
+        }
     }
 
     /// Coefficients that fit values at the points, added to `out` with a factor.
@@ -436,20 +397,19 @@ pub(super) fn cast(kernel: &LightKernel, forest: &Forest, gather: &Gather, draw:
         for (rays, half) in rays.iter_mut().zip([0u64, 1]) {
             let sequence = Sobol::of(seed::combine(point.key, half));
             for index in draw.directions.clone() {
-                let nowhere = Ray { to: [0.0; 2], leaf: Ray::NOWHERE, point: p };
                 if covered {
-                    rays.push(nowhere);
+                    rays.push(Ray::NOWHERE);
                     continue;
                 }
                 let hit = kernel.first_hit_from(side, x, kernel.direction(side, sequence.point(index)));
                 let met = hit.and_then(|hit| Some((hit, kernel.side_of(hit.patch, !hit.front)?)));
                 only_backs &= hit.is_some() && met.is_none();
                 rays.push(match met {
-                    None => nowhere,
+                    None => Ray::NOWHERE,
                     Some((hit, met)) => {
                         let at = if hit.front { hit.at } else { [hit.at[1], hit.at[0]] };
                         let (leaf, to) = forest.locate(met, at);
-                        Ray { to: to.map(|x| x as f32), leaf: leaf.0, ..nowhere }
+                        Ray::new(leaf.0, to)
                     }
                 });
             }
@@ -457,18 +417,4 @@ pub(super) fn cast(kernel: &LightKernel, forest: &Forest, gather: &Gather, draw:
         open.push(!only_backs || !kernel.is_buried(side, x));
     }
     Cast { rays, open }
-}
-
-/// Follows rays whose leaf was split since.
-fn relocate(forest: &Forest, rays: &mut [Ray]) {
-    for ray in rays {
-        if ray.leaf == Ray::NOWHERE {
-            continue;
-        }
-        let id = NodeId(ray.leaf);
-        if !forest.is_leaf(id) {
-            let (leaf, x) = forest.locate_below(id, ray.to.map(f64::from));
-            (ray.leaf, ray.to) = (leaf.0, x.map(|x| x as f32));
-        }
-    }
 }

@@ -3,15 +3,17 @@
 //! The samples of a row say where light comes from, not how much: another emission or reflectance changes nothing in
 //! them. Direct light is kept for unit exitance of every emitting material.
 
-use super::gather::{Gather, Ray};
-use super::lamps::Lamps;
+use super::gather::Gather;
+use super::lamps::{Lamps, MOST_GROUPS, MOST_LAMPS};
 use super::plan::MOST_LAMP_RAYS;
 use super::points::Point;
+use super::rays::{Ray, Rays};
 use super::{Phase, Sampled, counted_area, plan};
 use crate::kernel::LightKernel;
 use crate::scene::{Paint, PaintError, Scene};
 use crate::solution::Solution;
 use ondelette_compress::{Forest, NodeId};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// The samples behind a solution, as flat arrays: see [`Kept::check`] for what fits what.
@@ -64,14 +66,21 @@ impl Kept {
         if !all(&self.misfit) || !all(&self.scatter) || !all(&self.lamp_rays) {
             return Err("an error or a number of rays that is negative or no number".into());
         }
-        if self.lamp_rays.iter().any(|r| f64::from(*r) > MOST_LAMP_RAYS) {
-            return Err(format!("more than {MOST_LAMP_RAYS} rays to the lamps at a point"));
+        if self.lamp_rays.iter().any(|r| *r < 1.0 || f64::from(*r) > MOST_LAMP_RAYS) {
+            return Err(format!("less than one ray, or more than {MOST_LAMP_RAYS}, to the lamps at a point"));
         }
         if !self.direct.iter().all(|v| v.is_finite()) {
             return Err("direct light that is no number".into());
         }
         if self.groups.iter().any(|&m| m as usize >= scene.materials.len()) {
             return Err("a lamp's material that the scene does not have".into());
+        }
+        let is_distinct = |all: &[u32]| all.iter().collect::<BTreeSet<_>>().len() == all.len();
+        if self.groups.len() > MOST_GROUPS || self.lamps.len() > MOST_LAMPS {
+            return Err(format!("more than {MOST_GROUPS} materials of lamps, or {MOST_LAMPS} lamps"));
+        }
+        if !is_distinct(&self.groups) || !is_distinct(&self.lamps) {
+            return Err("a lamp, or the material of lamps, named twice".into());
         }
         for &side in &self.lamps {
             let known = scene
@@ -99,13 +108,17 @@ impl Kept {
             if drawn > plan::MOST_DIRECTIONS as u32 || !(right(0) || right(count * others)) {
                 return wrong(&format!("has samples {halves:?} of {drawn} directions at {count} points"));
             }
-            let own: u64 = halves.iter().map(|h| u64::from(*h)).sum();
-            let range = samples as usize..(samples + own) as usize;
-            if self.starts.get(range).is_none_or(|starts| starts.iter().any(|&s| u32::from(s) >= count)) {
-                return wrong("has samples that start from no point, or too few");
-            }
             points += u64::from(count);
-            samples += own;
+            for half in halves.map(u64::from) {
+                let range = samples as usize..(samples + half) as usize;
+                let mut each = vec![0; count as usize];
+                let starts = self.starts.get(range).unwrap_or(&[]);
+                let counted = starts.iter().all(|&s| each.get_mut(usize::from(s)).map(|n| *n += 1).is_some());
+                if !counted || each.iter().any(|n| n * u64::from(count) != half) {
+                    return wrong("has samples that start from no point, or not as many from each");
+                }
+                samples += half;
+            }
         }
         length("points", self.places.len(), points as usize)?;
         length("keys", self.keys.len(), points as usize)?;
@@ -119,7 +132,7 @@ impl Kept {
         if self.ends.iter().flatten().any(|x| !(-1.0..=2.0).contains(x)) {
             return Err("a sample that ends outside of its leaf".into());
         }
-        let is_end = |l: u32| l == Ray::NOWHERE || (l as usize) < nodes && forest.is_leaf(NodeId(l));
+        let is_end = |l: u32| l == Ray::NO_LEAF || (l as usize) < nodes && forest.is_leaf(NodeId(l));
         if !self.leaves.iter().all(|&l| is_end(l)) {
             return Err("a sample that ends at no leaf".into());
         }
@@ -194,6 +207,8 @@ impl Sampled {
     pub(crate) fn paint(&mut self, paints: &[Paint]) -> Result<(), PaintError> {
         let scene = self.scene.painted(paints)?;
         self.lamps.repaint(&scene);
+        // the shares of the lamps are others now
+        self.known.fill(None);
         self.scene = Arc::new(scene);
         self.begin_again();
         Ok(())
@@ -202,6 +217,9 @@ impl Sampled {
     /// Promises another error.
     pub(crate) fn promise(&mut self, error: f64) {
         self.settings.error = error;
+        // what was measured with less doubt than the new promise calls for
+        let more = self.lamps.promise(error);
+        self.misfit.iter_mut().chain(&mut self.scatter).for_each(|e| *e *= more.max(1.0) as f32);
         self.begin_again();
     }
 
@@ -217,6 +235,8 @@ impl Sampled {
         self.counted_area = counted_area(&self.scene, &self.kernel);
         (self.aim, self.rounds, self.corrections) = (plan::AIM, 0, 0);
         (self.refitted, self.stalled, self.error, self.whole) = (false, false, f64::INFINITY, 0.0);
+        // the samples are as good as they will be: so is the balance
+        self.precision = self.settings.error;
         // from the dark: the same light, whatever was balanced before
         self.indirect.fill([0.0; 3]);
         self.start_sweeping();
@@ -226,7 +246,9 @@ impl Sampled {
 impl Gather {
     /// Appends itself to what is kept.
     fn store(self, kept: &mut Kept) {
-        let parts = self.parts();
+        let points = self.points() as usize;
+        let [first, others] = self.parts();
+        let parts = [first.half(0), others.half(0), first.half(1), others.half(1)];
         let [a, b, c, d] = parts.map(|rays| rays.len() as u32);
         kept.gathers.push([self.node.0, self.points(), self.drawn, a, b, c, d]);
         for (point, open) in self.marked_points() {
@@ -234,10 +256,12 @@ impl Gather {
             kept.keys.push(point.key);
             kept.open.push(u8::from(open));
         }
-        for ray in parts.into_iter().flatten() {
-            kept.ends.push(ray.to);
-            kept.leaves.push(ray.leaf);
-            kept.starts.push(ray.point as u8);
+        for rays in parts.into_iter().filter(|rays| !rays.is_empty()) {
+            for (k, ray) in rays.iter().enumerate() {
+                kept.ends.push(ray.to().map(|x| x as f32));
+                kept.leaves.push(ray.leaf());
+                kept.starts.push((k / (rays.len() / points)) as u8);
+            }
         }
     }
 
@@ -248,11 +272,13 @@ impl Gather {
         *point = own.end;
         let points = own.clone().map(|p| Point { at: kept.places[p], key: kept.keys[p] }).collect();
         let open = kept.open[own].iter().map(|o| *o == 1).collect();
-        let parts = halves.map(|count| -> Vec<Ray> {
-            let own = *sample..*sample + count as usize;
-            *sample = own.end;
-            own.map(|k| Ray { to: kept.ends[k], leaf: kept.leaves[k], point: u32::from(kept.starts[k]) }).collect()
+        let [a, b, c, d] = halves.map(|count| -> Vec<Ray> {
+            let mut own: Vec<usize> = (*sample..*sample + count as usize).collect();
+            *sample += count as usize;
+            own.sort_by_key(|k| kept.starts[*k]);
+            own.into_iter().map(|k| Ray::new(kept.leaves[k], kept.ends[k].map(f64::from))).collect()
         });
+        let parts = [[a, c], [b, d]].map(Rays::of_halves);
         Gather::of_parts(NodeId(node), points, open, drawn, parts)
     }
 }

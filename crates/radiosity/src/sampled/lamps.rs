@@ -18,7 +18,7 @@ use ondelette_wavelet::cell::CellShape;
 /// Emitters up to which each is a lamp of its own; fainter ones are met by rays.
 pub(super) const MOST_LAMPS: usize = 4096;
 /// Emitting materials up to which each is known apart; the lamps of fainter ones are met by rays, too.
-const MOST_GROUPS: usize = 32;
+pub(super) const MOST_GROUPS: usize = 32;
 /// Among many things light has features finer than the points of an element can tell: what they say of its error is low
 /// by about this factor (against independent paths in furnished rooms), and by more below an error of `CLEAR`, since
 /// what they miss falls more slowly than what they see.
@@ -35,6 +35,9 @@ const SLIVER: f64 = 2e-6;
 /// error, and its limits.
 const WORTHY: f64 = 0.8;
 const WORTHY_LIMITS: [f64; 2] = [0.04, 0.15];
+/// So many looks at lamps that may bring most are taken in any case: what is bright may be hidden. Looks that find
+/// nothing in the way are free.
+const LOOKED_AT: usize = 4;
 
 /// One emitting side.
 #[derive(Clone, Debug)]
@@ -85,11 +88,23 @@ struct Sight {
 /// A lamp behind so much that rays decide what is seen of it, and its share of the rays of a point.
 pub(super) type Crowded = (u32, f32);
 
+/// The sums of their shares, one by one.
+pub(super) fn sums(crowded: &[Crowded]) -> Vec<f64> {
+    let mut sum = 0.0;
+    let add = |c: &Crowded| {
+        sum += f64::from(c.1);
+        sum
+    };
+    crowded.iter().map(add).collect()
+}
+
 /// The lamps as an element sees them.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Seen {
     exact: Vec<Sight>,
     pub(super) crowded: Vec<Crowded>,
+    /// Light that all lamps together would bring if nothing stood between, channels summed: what shares are shares of.
+    pub(super) whole: f64,
 }
 
 impl Seen {
@@ -149,13 +164,20 @@ impl Lamps {
     fn with(scene: &Scene, groups: Vec<(u32, Rgb)>, lamps: Vec<Lamp>, error: f64) -> Self {
         let mut is_lamp = vec![false; scene.sides.len()];
         lamps.iter().for_each(|l| is_lamp[l.side] = true);
-        let worthy = (WORTHY * error).clamp(WORTHY_LIMITS[0], WORTHY_LIMITS[1]);
-        let doubt = DOUBT * (1.0 + FINER * (CLEAR / error - 1.0)).clamp(1.0, 2.0);
-        Lamps { lamps, groups, is_lamp, worthy, doubt }
+        let mut lamps = Lamps { lamps, groups, is_lamp, worthy: 0.0, doubt: 1.0 };
+        lamps.promise(error);
+        lamps
     }
 
-    /// Takes over what materials emit now. A lamp that is off keeps a little power in the choice of what is looked at,
-    /// so that it can be switched on again.
+    /// Takes over a promise; the factor by which doubt grows.
+    pub(super) fn promise(&mut self, error: f64) -> f64 {
+        self.worthy = (WORTHY * error).clamp(WORTHY_LIMITS[0], WORTHY_LIMITS[1]);
+        let doubt = DOUBT * (1.0 + FINER * (CLEAR / error - 1.0)).clamp(1.0, 2.0);
+        doubt / std::mem::replace(&mut self.doubt, doubt)
+    }
+
+    /// Takes over what materials emit now. A lamp that is off keeps a little power in the choice of what is looked at;
+    /// what rays overlook of it then counts as its error once it is switched on again.
     pub(super) fn repaint(&mut self, scene: &Scene) {
         for (material, own) in &mut self.groups {
             *own = exitance(scene, *material as usize);
@@ -215,14 +237,20 @@ impl Lamps {
             whole += potential;
             facing.push((k, potential));
         }
-        let mut seen = Seen::default();
+        if whole <= 0.0 {
+            return Seen::default();
+        }
+        let mut seen = Seen { whole, ..Seen::default() };
+        facing.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        let mut looks = 0;
         for (k, potential) in facing {
             let share = potential / whole;
             let lamp = &self.lamps[k];
-            if share < self.worthy {
+            if share < self.worthy && looks >= LOOKED_AT {
                 seen.crowded.push((k as u32, share as f32));
                 continue;
             }
+            looks += 1;
             let (a, b) = (polygon.corners(), lamp.polygon.corners());
             if kernel.occluders().hides(a, b, [own, lamp.patch]) {
                 continue;
@@ -232,10 +260,34 @@ impl Lamps {
             if patches.len() > MOST_BLOCKERS {
                 seen.crowded.push((k as u32, share as f32));
             } else {
+                looks -= usize::from(patches.is_empty());
                 seen.exact.push(Sight { lamp: k as u32, patches });
             }
         }
         seen
+    }
+
+    /// What may be missed of each group, for unit exitance, where rays to lamps behind many things met nothing: a root
+    /// mean square. Half of such lamps are taken to be hidden altogether, and of the others any part to be seen; after
+    /// N rays that failed the square of the visible part is on average 2 / ((N + 2)^2 (N + 3)). `rays` go to all lamps
+    /// together, which without anything between would bring `whole`.
+    pub(super) fn overlooked(&self, crowded: &[Crowded], whole: f64, rays: f64) -> Vec<f64> {
+        let mut squares = vec![0.0; self.groups.len()];
+        for &(k, share) in crowded {
+            let lamp = &self.lamps[k as usize];
+            let (share, power) = (f64::from(share), lamp.power);
+            let failed = rays * share;
+            let part = 2.0 / ((failed + 2.0).powi(2) * (failed + 3.0));
+            squares[lamp.group] += (share * whole / power).powi(2) * part;
+        }
+        squares.into_iter().map(f64::sqrt).collect()
+    }
+
+    /// Rays of a point to each group, of `rays` to all lamps together.
+    pub(super) fn rays_to_groups(&self, crowded: &[Crowded], rays: f64) -> Vec<f64> {
+        let mut out = vec![0.0; self.groups.len()];
+        crowded.iter().for_each(|&(k, share)| out[self.lamps[k as usize].group] += rays * f64::from(share));
+        out
     }
 
     /// Adds to `out[group]` the irradiance that lamps which are cut out exactly bring to a point of a side with a
@@ -277,37 +329,37 @@ impl Lamps {
     }
 
     /// Adds to `out[group]` what lamps behind many things bring to a point of a side with a normal, for unit exitance:
-    /// twice, independently. On average `rays` go to all of them together.
+    /// twice, independently. On average `rays` go to all of them together. `sums` are those of their shares.
     pub(super) fn by_rays(
         &self,
         kernel: &LightKernel,
-        (crowded, rays): (&[Crowded], f64),
+        (crowded, sums, rays): (&[Crowded], &[f64], f64),
         (side, x, n): (usize, DVec3, DVec3),
         key: u64,
         out: &mut [[f64; 2]],
     ) {
-        // whole numbers of rays that add up as planned: none for most of the faint lamps
-        let mut carried = [0, 1].map(|half| seed::unit(seed::combine(key, half)));
-        for &(k, share) in crowded {
-            let planned = 0.5 * rays * f64::from(share);
-            carried.iter_mut().for_each(|c| *c += planned);
-            if carried[0].max(carried[1]) < 1.0 {
-                continue;
-            }
-            let lamp = &self.lamps[k as usize];
+        // whole numbers of rays that add up as planned: none for most of the faint lamps, which are leapt over
+        let start = [0, 1].map(|half| seed::unit(seed::combine(key, half)));
+        let whole = |half: usize, sum: f64| (start[half] + 0.5 * rays * sum) as u32;
+        let mut sent = [0; 2];
+        let mut k = 0;
+        loop {
+            k += sums[k..].partition_point(|&sum| [0, 1].map(|half| whole(half, sum)) == sent);
+            let Some(&(lamp, share)) = crowded.get(k) else { return };
+            let lamp = &self.lamps[lamp as usize];
             let is_behind = lamp.element.normal().dot(x - lamp.centre) <= 0.0;
             let mut clipped = None;
-            for (half, carried) in carried.iter_mut().enumerate() {
-                let count = *carried as u32;
-                *carried -= f64::from(count);
+            for half in 0..2 {
+                let count = whole(half, sums[k]) - std::mem::replace(&mut sent[half], whole(half, sums[k]));
                 if count == 0 || is_behind {
                     continue;
                 }
                 let polygon = clipped.get_or_insert_with(|| lamp.polygon.clipped(x, n));
                 let key = seed::combine(seed::combine(key, half as u64), lamp.side as u64);
                 let brings = self.sampled(kernel, lamp, polygon, side, (x, n), (key, count));
-                out[lamp.group][half] += brings / planned.min(1.0);
+                out[lamp.group][half] += brings / (0.5 * rays * f64::from(share)).min(1.0);
             }
+            k += 1;
         }
     }
 

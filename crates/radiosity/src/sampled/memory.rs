@@ -6,8 +6,9 @@
 //! cap, with other rays: another answer that keeps the same promise.
 
 use super::direct::Known;
-use super::gather::{Draw, Gather, Ray};
+use super::gather::{Draw, Gather};
 use super::points::Point;
+use super::rays::{Ray, Rays};
 use super::{Phase, Sampled};
 use crate::solver::SolveError;
 use ondelette_compress::forest::Node;
@@ -77,7 +78,7 @@ impl Sampled {
 impl Gather {
     /// Counted bytes.
     fn bytes(&self) -> usize {
-        let samples: usize = self.parts().iter().map(|part| size_of_val(*part)).sum();
+        let samples: usize = self.parts().map(Rays::bytes).iter().sum();
         size_of::<Gather>() + samples + self.points() as usize * (size_of::<Point>() + 1 + 4 * size_of::<f64>())
     }
 }

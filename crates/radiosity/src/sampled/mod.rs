@@ -20,6 +20,7 @@ mod memory;
 mod plan;
 mod points;
 mod positive;
+mod rays;
 mod shares;
 mod sphere;
 mod stitch;
@@ -58,6 +59,8 @@ const FIRST_DIRECTIONS: u32 = 4;
 const RAYS_A_STEP: usize = 16_384;
 /// Fewest rays of a point to all lamps together that it may see past many things.
 const LEAST_LAMP_RAYS: f32 = 8.0;
+/// Relative error that the first balance is to be fit for.
+const FIRST_PRECISION: f64 = 0.09;
 /// Pairs of element and lamp fitted in one step.
 const FITS_A_STEP: usize = 1024;
 
@@ -133,6 +136,8 @@ pub(crate) struct Sampled {
     /// Estimated integral of the error over each side, channels summed.
     missed: Vec<f64>,
     error: f64,
+    /// Relative error that the balance is to be fit for.
+    precision: f64,
     statistics: Statistics,
     scratch: Scratch,
 }
@@ -229,6 +234,7 @@ impl Sampled {
             stalled: false,
             missed: Vec::new(),
             error: f64::INFINITY,
+            precision: FIRST_PRECISION,
             statistics: Statistics::default(),
         }
     }

@@ -7,7 +7,7 @@
 use super::gather::{Draw, Gather};
 use super::shares::{Kind, shares, turning_point};
 use super::verdict::Verdict;
-use super::{Phase, Sampled};
+use super::{FIRST_PRECISION, Phase, Sampled};
 use crate::solver::Event;
 use ondelette_compress::NodeId;
 
@@ -62,7 +62,10 @@ impl Sampled {
         if apart > 0.0 {
             self.overlap = (missed / apart).clamp(OVERLAP[0], OVERLAP[1]);
         }
-        self.error = if self.whole > 0.0 { SAFETY * missed / self.whole + unsolved } else { 0.0 };
+        // in the dark, all that may be missed is all there is
+        let dark = if missed > 0.0 { 1.0 } else { 0.0 };
+        self.error = if self.whole > 0.0 { SAFETY * missed / self.whole + unsolved } else { dark };
+        self.precision = (0.3 * self.error).min(FIRST_PRECISION);
         self.missed.iter_mut().for_each(|m| *m *= SAFETY);
         self.rounds += 1;
         self.refitted = false;

@@ -3,23 +3,32 @@
 
 use glam::DVec3;
 
-/// Below this solid angle a triangle is as good as flat, and its angles are rounding.
-const FLAT: f64 = 1e-3;
+/// Up to this radius over distance a triangle is sampled by area instead: the density hardly varies, and is known.
+const FLAT: f64 = 0.25;
+
+/// And below this solid angle: it is edge-on, and its angles are rounding.
+const SLIVER: f64 = 1e-6;
 
 /// A triangle as seen from a point.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cone {
     corners: [DVec3; 3],
-    /// Solid angle in steradians.
+    /// Solid angle in steradians; about, where it is sampled by area.
     pub(super) solid_angle: f64,
-    /// Angle at the first corner, and cosine of the side from it to the second.
-    alpha: f64,
-    cos_c: f64,
+    /// Angle at the first corner, and cosine of the side from it to the second; none where it is sampled by area.
+    angles: Option<[f64; 2]>,
 }
 
 impl Cone {
     /// The triangle with these corners relative to the point.
     pub(super) fn new(corners: [DVec3; 3]) -> Cone {
+        let [a, b, c] = corners;
+        let centre = (a + b + c) / 3.0;
+        let distance = centre.length();
+        if corners.iter().all(|p| p.distance_squared(centre) < (FLAT * distance).powi(2)) {
+            let solid_angle = 0.5 * (b - a).cross(c - a).dot(centre).abs() / (distance * distance * distance);
+            return Cone { corners, solid_angle, angles: None };
+        }
         let [a, b, c] = corners.map(|p| p.normalize_or_zero());
         // van Oosterom and Strackee 1983
         let volume = a.dot(b.cross(c)).abs();
@@ -28,25 +37,25 @@ impl Cone {
             let (u, v) = (p.cross(q), p.cross(r));
             u.cross(v).length().atan2(u.dot(v))
         };
-        Cone { corners, solid_angle, alpha: angle(a, b, c), cos_c: a.dot(b) }
+        Cone { corners, solid_angle, angles: Some([angle(a, b, c), a.dot(b)]) }
     }
 
     /// The direction (of any length) for a point of the unit square, and its density per steradian.
     pub(super) fn direction(&self, [s, t]: [f64; 2]) -> (DVec3, f64) {
         let [a, b, c] = self.corners;
-        if self.solid_angle < FLAT {
+        let Some([alpha, cos_c]) = self.angles.filter(|_| self.solid_angle > SLIVER) else {
             let root = s.sqrt();
             let d = a + (b - a) * (root * (1.0 - t)) + (c - a) * (root * t);
             let twice = (b - a).cross(c - a);
             // area per solid angle: r^3 / height
             let r = d.length();
             return (d, r * r * r / (0.5 * twice.dot(d).abs()));
-        }
+        };
         let [a, b, c] = [a, b, c].map(|p| p.normalize_or_zero());
         let across = |p: DVec3, q: DVec3| (p - q * p.dot(q)).normalize_or_zero();
-        let (sin_alpha, cos_alpha) = self.alpha.sin_cos();
-        let (sin, cos) = (s * self.solid_angle - self.alpha).sin_cos();
-        let (u, v) = (cos - cos_alpha, sin + sin_alpha * self.cos_c);
+        let (sin_alpha, cos_alpha) = alpha.sin_cos();
+        let (sin, cos) = (s * self.solid_angle - alpha).sin_cos();
+        let (u, v) = (cos - cos_alpha, sin + sin_alpha * cos_c);
         let below = (v * sin + u * cos) * sin_alpha;
         let q = if below == 0.0 { 1.0 } else { (((v * cos - u * sin) * cos_alpha - v) / below).clamp(-1.0, 1.0) };
         let on_side = a * q + across(c, a) * (1.0 - q * q).max(0.0).sqrt();

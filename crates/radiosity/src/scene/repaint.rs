@@ -34,8 +34,9 @@ pub enum PaintError {
     },
     /// A solution with links, in which nothing links this material's light.
     #[error(
-        "'{name}' neither shone nor reflected when the scene was solved, so that nothing links its light: solve the \
-         scene anew with a trace of it (a reflectance of 0.001), or with --method sampled"
+        "'{name}' neither shines nor reflects in the solution that is to be lit anew, so that links may not know its \
+         light: start from a solution in which it did, or solve the scene anew with a trace of it (a reflectance of \
+         0.001), or with --method sampled"
     )]
     Unlinked {
         /// The material.

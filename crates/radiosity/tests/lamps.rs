@@ -1,0 +1,118 @@
+//! Many lamps, hidden lamps, lamps of very different strength: none is forgotten, and none is paid for twice.
+
+use ondelette_radiosity::scene::{Paint, samples};
+use ondelette_radiosity::{Event, Rgb, Scene, Settings, Solution, Solver};
+
+type Quad = ([[f64; 3]; 4], Rgb, Rgb);
+
+/// Walls of a unit cube, seen from inside; side 0 is the floor.
+fn room(reflectance: f64) -> Vec<Quad> {
+    let p = |i: u32| [0, 1, 2].map(|k| f64::from(i >> k & 1));
+    let walls = [[0, 1, 3, 2], [6, 7, 5, 4], [0, 2, 6, 4], [3, 1, 5, 7], [1, 0, 4, 5], [2, 3, 7, 6]];
+    walls.iter().map(|w| (w.map(p), Rgb::grey(reflectance), Rgb::BLACK)).collect()
+}
+
+/// A square lamp that faces down.
+fn lamp([x, y, z]: [f64; 3], size: f64, radiance: f64) -> Quad {
+    ([[x, y, z], [x, y + size, z], [x + size, y + size, z], [x + size, y, z]], Rgb::BLACK, Rgb::grey(radiance))
+}
+
+fn solver(scene: Scene, error: f64) -> Solver {
+    let mut solver = Solver::new(scene, Settings { error, ..Settings::default() }).unwrap();
+    while solver.step().is_some() {}
+    solver
+}
+
+fn solve(faces: &[Quad], error: f64) -> Solution {
+    let solution = solver(samples::quads("room", faces), error).into_solution();
+    assert!(solution.is_finished());
+    solution
+}
+
+/// Mean irradiance of the floor and the walls.
+fn light(solution: &Solution) -> f64 {
+    (0..6).map(|side| solution.mean_irradiance(side).sum()).sum()
+}
+
+/// Steps to the next estimate of the error.
+fn balance(solver: &mut Solver) {
+    while !matches!(solver.step(), Some(Event::Solved { .. }) | None) {}
+}
+
+#[test]
+fn a_bright_lamp_behind_the_ceiling_takes_nothing_from_a_faint_one_below() {
+    let mut faces = room(0.5);
+    faces.push(lamp([0.6, 0.6, 0.9], 0.2, 1.0));
+    let alone = light(&solve(&faces, 0.03));
+    for (many, radiance) in [(1, 1000.0), (5, 100.0)] {
+        let mut faces = faces.clone();
+        for k in 0..many * many {
+            let at = |i: usize| 0.05 + 0.9 * i as f64 / many as f64;
+            faces.push(lamp([at(k % many), at(k / many), 1.3], 0.15, radiance));
+        }
+        let found = light(&solve(&faces, 0.03));
+        assert!((found / alone - 1.0).abs() < 0.02, "{many}: {found} instead of {alone}");
+    }
+}
+
+#[test]
+fn a_lamp_of_its_own_material_costs_no_more_than_a_shared_one() {
+    let lamps = |own: f64| -> Vec<Quad> {
+        let at = |i: usize| 0.1 + 0.2 * i as f64 - 0.025;
+        (0..25).map(|k| lamp([at(k % 5), at(k / 5), 0.95], 0.05, 10.0 * (1.0 + own * k as f64))).collect()
+    };
+    let with = |own: f64| {
+        let mut faces = room(0.5);
+        faces.extend(lamps(own));
+        let mut scene = samples::quads("room", &faces);
+        if own == 0.0 {
+            let shared = scene.patches.iter().map(|p| p.material).max().unwrap();
+            let shines = |m: u32| faces[m as usize].2.sum() > 0.0;
+            scene.patches.iter_mut().filter(|p| shines(p.material)).for_each(|p| p.material = shared);
+        }
+        let solution = solver(scene, 0.05).into_solution();
+        assert!(solution.is_finished());
+        (solution.forest().leaves() as f64, light(&solution))
+    };
+    let ((few, shared), (many, own)) = (with(0.0), with(1e-4));
+    assert!(many < 2.0 * few + 500.0, "{many} elements where a shared material takes {few}");
+    assert!((own / shared - 1.0).abs() < 0.02, "{own} and {shared}");
+}
+
+#[test]
+fn a_faint_lamp_is_known_well_enough_when_the_bright_one_goes_out() {
+    for ratio in [60.0, 1e6] {
+        let mut faces = room(0.5);
+        faces.extend([lamp([0.1, 0.1, 0.95], 0.25, ratio), lamp([0.6, 0.6, 0.95], 0.25, 1.0)]);
+        let scene = samples::quads("room", &faces);
+        let bright = scene.materials[6].name.clone();
+        let kept = solver(scene, 0.1).into_kept();
+        let mut again = Solver::resume(&kept).unwrap();
+        again.relight(&[Paint::Emission(bright, Rgb::BLACK)]).unwrap();
+        balance(&mut again);
+        faces.remove(6);
+        let fresh = light(&solve(&faces, 0.01));
+        let (stated, off) = (again.solution().statistics().estimated_error, light(&again.solution()) / fresh - 1.0);
+        assert!(off.abs() < stated + 0.01, "{ratio}: off by {off}, stated {stated}");
+        while again.step().is_some() {}
+        let off = light(&again.solution()) / fresh - 1.0;
+        assert!(again.solution().is_finished() && off.abs() < 0.08, "{ratio}: refined, off by {off}");
+    }
+}
+
+#[test]
+fn lighting_anew_with_the_same_lamps_keeps_the_promise_without_a_ray() {
+    let mut faces = room(0.7);
+    faces.push(lamp([0.4, 0.4, 0.95], 0.2, 10.0));
+    for error in [0.03, 0.005] {
+        let scene = samples::quads("room", &faces);
+        let same = Paint::Emission(scene.materials[6].name.clone(), scene.materials[6].radiance);
+        let kept = solver(scene, error).into_kept();
+        let mut again = Solver::resume(&kept).unwrap();
+        again.relight(&[same]).unwrap();
+        balance(&mut again);
+        let statistics = again.solution().statistics().clone();
+        assert!(statistics.estimated_error <= error, "{error}: {}", statistics.estimated_error);
+        assert_eq!(statistics.rays, kept.statistics().rays);
+    }
+}
