@@ -20,6 +20,8 @@ use ondelette_numerics::{par, seed};
 const RESTART: usize = 30;
 /// Samples read in a step of a sweep.
 const READS_A_STEP: usize = 1 << 20;
+/// Elements that gather in one task.
+const GATHERS_A_TASK: usize = 32;
 /// Most solves for one set of samples.
 const MOST_CORRECTIONS: u32 = 12;
 /// Draws of signs for the scatter; so many elements are a sample of their own, and one draw is enough. What the mean
@@ -41,7 +43,7 @@ pub(super) struct Sweep {
     /// What every leaf sends on.
     radiosity: Vec<[f64; 3]>,
     forms: Vec<Form>,
-    /// What is gathered, and half the difference of the halves, `[gather][function]`.
+    /// What is gathered, and half the difference of the halves, in [`super::slots::Slots`].
     gathered: Vec<[f64; 3]>,
     apart: Vec<[f64; 3]>,
     done: usize,
@@ -77,7 +79,6 @@ impl Sampled {
     }
 
     pub(super) fn sweep(&mut self, mut sweep: Sweep) -> Event {
-        let stride = self.forest.stride();
         let (mut count, mut reads) = (0, 0);
         let most = if self.streaming { RAYS_A_STEP } else { READS_A_STEP };
         while sweep.done + count < self.gathers.len() && reads < most {
@@ -87,7 +88,8 @@ impl Sampled {
         let field = Field::new(&self.forest, &sweep.radiosity, &sweep.forms);
         let gathers = &self.gathers[sweep.done..sweep.done + count];
         let judged = par::map(count, |k| {
-            let (mut out, mut apart) = (vec![[0.0; 3]; stride], vec![[0.0; 3]; stride]);
+            let width = gathers[k].functions(&self.forest).len();
+            let (mut out, mut apart) = (vec![[0.0; 3]; width], vec![[0.0; 3]; width]);
             let drawn_again = gathers[k]
                 .missing((sweep.done + k) as u32)
                 .map(|draw| gathers[k].completed(gather::cast(&self.kernel, &self.forest, &gathers[k], &draw)));
@@ -96,8 +98,8 @@ impl Sampled {
         });
         for (k, (verdict, out, apart)) in (sweep.done..).zip(judged) {
             self.verdicts[k] = verdict;
-            sweep.gathered[k * stride..(k + 1) * stride].copy_from_slice(&out);
-            sweep.apart[k * stride..(k + 1) * stride].copy_from_slice(&apart);
+            sweep.gathered[self.slots.range(k)].copy_from_slice(&out);
+            sweep.apart[self.slots.range(k)].copy_from_slice(&apart);
         }
         sweep.done += count;
         let event = Event::Gathering { done: sweep.done, total: self.gathers.len() };
@@ -131,7 +133,8 @@ impl Sampled {
 
     pub(super) fn solve(&mut self, mut gmres: Box<Gmres<3>>) -> Event {
         let (now, wanted) = (self.relative(&gmres), 0.3 * self.wanted());
-        let direction = if now <= wanted || gmres.steps() >= RESTART { None } else { gmres.direction() };
+        let direction =
+            if now <= wanted || gmres.steps() >= self.krylov_vectors(RESTART) { None } else { gmres.direction() };
         let Some(direction) = direction else {
             self.indirect = gmres.solution();
             self.start_sweeping();
@@ -163,11 +166,15 @@ impl Sampled {
         self.reflect(&mut values, false);
         field::bilinear(&self.forest, &values, &mut forms);
         let field = Field::new(&self.forest, &values, &forms);
-        let stride = self.forest.stride();
-        let mut out = vec![[0.0; 3]; self.gathers.len() * stride];
-        par::for_each_chunk(&mut out, 16 * stride, |chunk, slots| {
-            for (k, own) in slots.chunks_mut(stride).enumerate() {
-                self.gathers[chunk * 16 + k].gather(&field, own);
+        let mut out = vec![[0.0; 3]; self.slots.len()];
+        par::for_each(self.slots.chunks(GATHERS_A_TASK, &mut out), |(first, mut rest)| {
+            for gather in &self.gathers[first..] {
+                let (own, others) = rest.split_at_mut(gather.functions(&self.forest).len().min(rest.len()));
+                if own.is_empty() {
+                    break;
+                }
+                gather.gather(&field, own);
+                rest = others;
             }
         });
         self.scratch = Scratch { values, forms };
@@ -176,12 +183,11 @@ impl Sampled {
 
     /// Begins with a pattern of signs for the scatter.
     fn start_spreading(&mut self, apart: Vec<[f64; 3]>, passed: Vec<[f64; 3]>, pattern: u64, unsolved: f64) {
-        let stride = self.forest.stride();
         let mut signed = apart.clone();
-        for (gather, own) in self.gathers.iter().zip(signed.chunks_mut(stride)) {
+        for (k, gather) in self.gathers.iter().enumerate() {
             let key = self.forest.node(gather.node).cell.key;
             if seed::unit(seed::combine(key, pattern)) < 0.5 {
-                own.iter_mut().flatten().for_each(|v| *v = -*v);
+                signed[self.slots.range(k)].iter_mut().flatten().for_each(|v| *v = -*v);
             }
         }
         let right = self.pass_on(&signed);
@@ -194,7 +200,8 @@ impl Sampled {
     pub(super) fn spread(&mut self, mut spread: Spread) -> Event {
         let size = |v: [f64; 3]| v.iter().sum::<f64>();
         let scatter = size(Gmres::new(spread.apart.clone(), spread.apart.clone(), self.weights()).residual());
-        let open = size(spread.gmres.residual()) > SPREAD_TOLERANCE * scatter && spread.gmres.steps() < SPREAD_STEPS;
+        let open = size(spread.gmres.residual()) > SPREAD_TOLERANCE * scatter
+            && spread.gmres.steps() < self.krylov_vectors(SPREAD_STEPS);
         if let Some(direction) = spread.gmres.direction().filter(|_| open) {
             let product = self.apply(direction);
             spread.gmres.supply(product);
@@ -222,7 +229,8 @@ impl Sampled {
     fn settle(&mut self, apart: &[[f64; 3]], passed: &[[f64; 3]]) {
         let stride = self.forest.stride();
         let noise = |k: usize| self.verdicts[k].noise.hypot(self.verdicts[k].misfit.max(0.0).sqrt());
-        let [smooth, apart] = stitch::stitched(&self.forest, &self.gathers, [&self.indirect, apart], noise);
+        let fields: [&[[f64; 3]]; 2] = [&self.indirect, apart];
+        let [smooth, apart] = stitch::stitched(&self.forest, (&self.gathers, &self.slots), fields, noise);
         // elements that met nothing bright may just have missed it: they are as uncertain as others were at first
         let (mut area, mut square) = (0.0, 0.0);
         for (gather, verdict) in self.gathers.iter().zip(&self.verdicts) {
@@ -233,27 +241,31 @@ impl Sampled {
         let usual = if area > 0.0 { square / area } else { 0.0 };
         for (k, verdict) in self.verdicts.iter_mut().enumerate() {
             let basis = self.forest.basis_of(self.gathers[k].node);
-            let own = gather::size_of(basis, &apart[k * stride..]);
-            let passed = gather::size_of(basis, &passed[k * stride..]);
+            let own = gather::size_of(basis, &apart[k * stride..][..basis.len()]);
+            let passed = gather::size_of(basis, &passed[self.slots.range(k)]);
             *verdict = Verdict { scatter: own.hypot(passed), ..*verdict };
             verdict.doubt(usual, f64::from(self.gathers[k].drawn));
         }
-        let mut irradiance = self.direct_light(Vec::new());
-        self.add_indirect(&smooth, &mut irradiance);
+        let values = std::mem::take(&mut self.scratch.values);
+        let mut irradiance = self.direct_light(values);
+        let functions = |k: usize| {
+            let basis = self.forest.basis_of(self.gathers[k].node);
+            basis.truncated(basis.order())
+        };
+        self.add_gathered(|k| (functions(k), &smooth[k * stride..]), &mut irradiance);
         positive::keep_positive(&self.forest, &mut irradiance);
-        self.irradiance = irradiance;
+        self.scratch.values = std::mem::replace(&mut self.irradiance, irradiance);
     }
 
     /// Weights of the coefficients of the gathers in inner products: counted areas.
     fn weights(&self) -> Vec<f64> {
-        let stride = self.forest.stride();
-        let mut weights = vec![0.0; self.gathers.len() * stride];
+        let mut weights = vec![0.0; self.slots.len()];
         for (k, gather) in self.gathers.iter().enumerate() {
             let node = self.forest.node(gather.node);
             let basis = self.forest.basis_of(gather.node);
             if self.counts(node.cell.root) {
                 let share = if basis.is_nested() { node.measure } else { node.measure / basis.len() as f64 };
-                weights[k * stride..k * stride + basis.len()].fill(share);
+                weights[self.slots.range(k)].fill(share);
             }
         }
         weights

@@ -14,8 +14,8 @@ pub(super) struct Field<'a> {
     bilinear: &'a [Form],
 }
 
-/// `a + b s + c t + d s t`, in the form in which rays read it fastest.
-pub(super) type Form = [[f64; 3]; 4];
+/// `a + b s + c t + d s t`, in the form in which rays read it fastest; rounding is far below scatter.
+pub(super) type Form = [[f32; 3]; 4];
 
 /// The form of coefficients on each leaf, for bases up to the second order; empty for others. Cost linear in the nodes.
 pub(super) fn bilinear(forest: &Forest, coefficients: &[[f64; 3]], out: &mut Vec<Form>) {
@@ -47,7 +47,7 @@ pub(super) fn bilinear(forest: &Forest, coefficients: &[[f64; 3]], out: &mut Vec
                 }
             }
         }
-        sum
+        sum.map(|of| of.map(|v| v as f32))
     };
     out.extend(forest.nodes().iter().zip(coefficients.chunks(stride)).map(form));
 }
@@ -66,8 +66,9 @@ impl<'a> Field<'a> {
         }
         let [s, t] = ray.to();
         if let Some([a, b, c, d]) = self.bilinear.get(leaf as usize) {
+            let [s, t] = [s, t].map(|x| x as f32);
             let st = s * t;
-            return std::array::from_fn(|k| a[k] + b[k] * s + c[k] * t + d[k] * st);
+            return std::array::from_fn(|k| f64::from(a[k] + b[k] * s + c[k] * t + d[k] * st));
         }
         let basis = self.forest.basis(self.forest.node(NodeId(leaf)).cell.shape);
         let mut values = [0.0; MOST];

@@ -8,7 +8,7 @@
 
 use super::direct;
 use super::field::Field;
-use super::points::{self, Grain, Point, strata};
+use super::points::{self, Grain, Marks, Point, strata};
 use super::rays::{Ray, Rays};
 use super::verdict::Verdict;
 use crate::kernel::LightKernel;
@@ -30,7 +30,7 @@ pub(super) struct Gather {
     /// Where it gathers.
     points: Vec<Point>,
     /// Which of them are not inside of something.
-    lit: Vec<bool>,
+    lit: Marks,
     /// Directions drawn at every point, in each half.
     pub(super) drawn: u32,
     /// The first samples of every point, and the others.
@@ -38,7 +38,7 @@ pub(super) struct Gather {
     others: Rays,
     /// Order of the functions in use.
     pub(super) order: usize,
-    /// Values at the points to coefficients of the functions in use, `[function][point]`.
+    /// Values at the points to coefficients of the functions in use, `[function][point]`; empty for a mean.
     fit: Vec<f64>,
 }
 
@@ -75,14 +75,26 @@ impl Gather {
         let points = points::at_first(&cell, grain);
         Gather {
             node,
-            lit: vec![false; points.len()],
+            lit: Marks::default(),
             points,
             drawn: 0,
             first: Default::default(),
             others: Default::default(),
-            order: 1,
+            order: coarsest(forest.basis_of(node)),
             fit: Vec::new(),
         }
+    }
+
+    /// Bytes of its arrays, and how many there are.
+    pub(super) fn bytes(&self) -> (usize, usize) {
+        let parts =
+            [size_of_val(&self.points[..]), size_of_val(&self.fit[..]), self.first.bytes(), self.others.bytes()];
+        (parts.iter().sum(), parts.iter().filter(|p| **p > 0).count())
+    }
+
+    /// The functions in use.
+    pub(super) fn functions<'a>(&self, forest: &'a Forest) -> &'a [u16] {
+        forest.basis_of(self.node).truncated(self.order)
     }
 
     /// If it has no point outside of things among the known ones, and the others, which are new, are inside as well,
@@ -91,8 +103,8 @@ impl Gather {
         let cell = &forest.node(self.node).cell;
         let element = kernel.element(cell);
         let is_buried = |point: &Point| kernel.is_buried(cell.root as usize, element.point(point.at));
-        let (known, fresh) = self.points.split_at_mut(known as usize);
-        if self.lit[..known.len()].contains(&true) || !fresh.iter().all(is_buried) {
+        let (_, fresh) = self.points.split_at_mut(known as usize);
+        if self.lit.count() > 0 || !fresh.iter().all(is_buried) {
             return;
         }
         let corners = direct::open_corners(kernel, cell);
@@ -103,13 +115,17 @@ impl Gather {
 
     /// Whether none of its points is inside of something.
     pub(super) fn is_whole(&self) -> bool {
-        self.lit.iter().all(|l| *l)
+        self.lit.count() == self.points.len()
     }
 
-    /// Of known parts: the first samples, and the others.
-    pub(super) fn of_parts(node: NodeId, points: Vec<Point>, lit: Vec<bool>, drawn: u32, parts: [Rays; 2]) -> Self {
-        let [first, others] = parts;
-        Gather { node, points, lit, drawn, first, others, order: 1, fit: Vec::new() }
+    /// Of known parts: the first samples, and the others; with functions up to an order.
+    pub(super) fn of_parts(
+        (node, order): (NodeId, usize),
+        (points, lit): (Vec<Point>, Marks),
+        drawn: u32,
+        [first, others]: [Rays; 2],
+    ) -> Self {
+        Gather { node, points, lit, drawn, first, others, order, fit: Vec::new() }
     }
 
     /// Its samples, as [`Gather::of_parts`] takes them.
@@ -119,7 +135,7 @@ impl Gather {
 
     /// Its points, and whether they are not inside of something.
     pub(super) fn marked_points(&self) -> impl Iterator<Item = (&Point, bool)> {
-        self.points.iter().zip(self.lit.iter().copied())
+        self.points.iter().enumerate().map(|(p, point)| (point, self.lit.has(p)))
     }
 
     /// Samples of both halves, stored or not.
@@ -157,7 +173,9 @@ impl Gather {
     /// Takes drawn samples.
     pub(super) fn take(&mut self, draw: &Draw, cast: Cast) {
         for (p, open) in draw.points.clone().zip(cast.open) {
-            self.lit[p as usize] |= open;
+            if open {
+                self.lit.add(p as usize);
+            }
         }
         let early = (Self::FIRST.saturating_sub(draw.directions.start) as usize).min(draw.directions.len());
         let each = cast.rays[0].len() / draw.points.len().max(1);
@@ -176,12 +194,13 @@ impl Gather {
     /// Chooses the functions to fit: at most what the points determine.
     pub(super) fn prepare(&mut self, basis: &CellBasis) {
         // points inside of something are dark, and no part of the fit
-        let points = self.lit.iter().filter(|l| **l).count();
+        let points = self.lit.count();
         if points == 0 {
-            self.order = if basis.is_nested() { 1 } else { basis.order() };
+            self.order = coarsest(basis);
             self.fit = vec![0.0; basis.truncated(self.order).len() * self.points.len()];
             return;
         }
+        self.fit = Vec::new();
         self.order = if basis.is_nested() {
             // through as many points functions would swing between them, nothing would say how wrong they are, and the
             // balance might not converge
@@ -193,10 +212,13 @@ impl Gather {
         };
         let index = basis.truncated(self.order);
         let n = index.len();
+        if n == 1 {
+            return;
+        }
         let mut values = vec![0.0; self.points.len() * n];
         let mut all = [0.0; MOST];
-        for ((point, lit), row) in self.points.iter().zip(&self.lit).zip(values.chunks_mut(n)) {
-            if *lit {
+        for ((p, point), row) in self.points.iter().enumerate().zip(values.chunks_mut(n)) {
+            if self.lit.has(p) {
                 basis.eval(point.at, &mut all);
                 row.iter_mut().zip(index).for_each(|(v, &i)| *v = all[usize::from(i)]);
             }
@@ -215,13 +237,13 @@ impl Gather {
         let constant: Vec<f64> = (0..n).map(|i| (0..n).map(|j| gram[i * n + j] * one(j)).sum()).collect();
         (0..n).for_each(|i| gram[i * n + i] += 1e-4);
         let inverse = dense::inverse(&gram, n);
-        self.fit.clear();
+        self.fit.reserve_exact(n * self.points.len());
         for i in 0..n {
             let row = &inverse[i * n..(i + 1) * n];
             let rest = one(i) - row.iter().zip(&constant).map(|(a, b)| a * b).sum::<f64>();
-            for (value, lit) in values.chunks(n).zip(&self.lit) {
+            for (p, value) in values.chunks(n).enumerate() {
                 let whole = row.iter().zip(value).map(|(a, b)| a * b).sum::<f64>() + rest;
-                self.fit.push(if *lit { share * whole } else { 0.0 });
+                self.fit.push(if self.lit.has(p) { share * whole } else { 0.0 });
             }
         }
     }
@@ -240,9 +262,10 @@ impl Gather {
         let child = |c: usize| {
             let chosen: Vec<usize> = (0..places.len()).filter(|&p| places[p].0 == c).collect();
             let points = chosen.iter().map(|&p| Point { at: places[p].1, ..self.points[p] }).collect();
-            let lit = chosen.iter().map(|&p| self.lit[p]).collect();
+            let lit = chosen.iter().map(|&p| self.lit.has(p)).collect();
             let parts = [&self.first, &self.others].map(|rays| rays.of(&chosen, places.len()));
-            let mut child = Gather::of_parts(forest.child(self.node, c), points, lit, self.drawn, parts);
+            let node = (forest.child(self.node, c), self.order);
+            let mut child = Gather::of_parts(node, (points, lit), self.drawn, parts);
             let known = child.points();
             child.add_points(forest, 1);
             (child, known)
@@ -259,7 +282,6 @@ impl Gather {
     pub(super) fn add_points(&mut self, forest: &Forest, levels: u32) {
         let cell = forest.node(self.node).cell;
         self.points.extend(strata(cell.shape, levels, seed::combine(cell.key, 0x6578_7472)));
-        self.lit.resize(self.points.len(), false);
     }
 
     /// Values at the points from one half of the samples.
@@ -283,11 +305,16 @@ impl Gather {
         }
     }
 
-    /// Coefficients that fit values at the points, added to `out` with a factor.
-    fn add_fit(&self, basis: &CellBasis, values: &[[f64; 3]], factor: f64, out: &mut [[f64; 3]]) {
-        let index = basis.truncated(self.order);
-        for (row, &i) in self.fit.chunks(values.len()).zip(index) {
-            let to = &mut out[usize::from(i)];
+    /// Coefficients in use that fit values at the points, added to `out` with a factor.
+    fn add_fit(&self, values: &[[f64; 3]], factor: f64, out: &mut [[f64; 3]]) {
+        if self.fit.is_empty() {
+            let share = factor / self.lit.count().max(1) as f64;
+            for (_, v) in values.iter().enumerate().filter(|(p, _)| self.lit.has(*p)) {
+                (0..3).for_each(|c| out[0][c] += share * v[c]);
+            }
+            return;
+        }
+        for (row, to) in self.fit.chunks(values.len()).zip(out) {
             for (k, v) in row.iter().zip(values) {
                 (0..3).for_each(|c| to[c] += factor * k * v[c]);
             }
@@ -296,12 +323,11 @@ impl Gather {
 
     /// What the first samples gather, as coefficients.
     pub(super) fn gather(&self, radiosity: &Field<'_>, out: &mut [[f64; 3]]) {
-        let basis = radiosity.forest.basis_of(self.node);
         let mut values = [[0.0; 3]; Gather::MOST_POINTS];
         let values = &mut values[..self.points.len()];
         for half in 0..2 {
             self.values(radiosity, half, false, values);
-            self.add_fit(basis, values, 0.5, out);
+            self.add_fit(values, 0.5, out);
         }
     }
 
@@ -309,14 +335,15 @@ impl Gather {
     /// themselves.
     pub(super) fn judge(&self, radiosity: &Field<'_>, out: &mut [[f64; 3]], apart: &mut [[f64; 3]]) -> Verdict {
         let basis = radiosity.forest.basis_of(self.node);
-        let n = basis.len();
+        let index = basis.truncated(self.order);
+        let n = index.len();
         let points = self.points.len();
         let mut values = [[[0.0; 3]; Gather::MOST_POINTS]; 2];
         let mut fits = [[[0.0; 3]; MOST]; 2];
         for half in 0..2 {
             let own = &mut values[half][..points];
             self.values(radiosity, half, true, own);
-            self.add_fit(basis, own, 1.0, &mut fits[half][..n]);
+            self.add_fit(own, 1.0, &mut fits[half][..n]);
         }
         for i in 0..n {
             for c in 0..3 {
@@ -327,14 +354,14 @@ impl Gather {
         let mut noise = [0.0; 3];
         let mut misfit = 0.0;
         let mut functions = [0.0; MOST];
-        let points = self.lit.iter().filter(|l| **l).count();
-        for (p, point) in self.points.iter().enumerate().filter(|(p, _)| self.lit[*p]) {
+        let points = self.lit.count();
+        for (p, point) in self.points.iter().enumerate().filter(|(p, _)| self.lit.has(*p)) {
             basis.eval(point.at, &mut functions);
             let mut product = 0.0;
             for c in 0..3 {
                 noise[c] += (0.5 * (values[0][p][c] - values[1][p][c])).powi(2);
                 let left = |h: usize| {
-                    let fitted: f64 = fits[h][..n].iter().zip(&functions).map(|(f, v)| f[c] * v).sum();
+                    let fitted: f64 = fits[h].iter().zip(index).map(|(f, &i)| f[c] * functions[usize::from(i)]).sum();
                     values[h][p][c] - fitted
                 };
                 let both = left(0) * left(1);
@@ -343,9 +370,8 @@ impl Gather {
             }
             misfit += product * product.abs();
         }
-        let used = basis.truncated(self.order).len();
         // the fit took its share of the degrees of freedom
-        let left = points.saturating_sub(used);
+        let left = points.saturating_sub(n);
         misfit = if left > 0 { misfit / left as f64 } else { 0.0 };
         let noise: f64 = noise.iter().map(|s| (s / points.max(1) as f64).sqrt()).sum();
         // the product of two scattered numbers, the mean of `left` of them
@@ -357,15 +383,20 @@ impl Gather {
             per_direction,
             misfit,
             certainty,
-            share: (used as f64 / points.max(1) as f64).sqrt(),
+            share: (n as f64 / points.max(1) as f64).sqrt(),
         }
     }
+}
+
+/// The lowest order of functions that a basis has by themselves.
+pub(super) fn coarsest(basis: &CellBasis) -> usize {
+    if basis.is_nested() { 1 } else { basis.order() }
 }
 
 /// Root mean square over an element of the function with these coefficients, channels summed.
 pub(super) fn size_of(basis: &CellBasis, coefficients: &[[f64; 3]]) -> f64 {
     let mut square = [0.0; 3];
-    for own in &coefficients[..basis.len()] {
+    for own in coefficients {
         (0..3).for_each(|c| square[c] += own[c] * own[c]);
     }
     let scale = if basis.is_nested() { 1.0 } else { 1.0 / basis.len() as f64 };

@@ -3,7 +3,7 @@
 //! The samples of a row say where light comes from, not how much: another emission or reflectance changes nothing in
 //! them. Direct light is kept for unit exitance of every emitting material.
 
-use super::gather::Gather;
+use super::gather::{self, Gather};
 use super::lamps::{Lamps, MOST_GROUPS, MOST_LAMPS};
 use super::plan::MOST_LAMP_RAYS;
 use super::points::Point;
@@ -13,6 +13,7 @@ use crate::kernel::LightKernel;
 use crate::scene::{Paint, PaintError, Scene};
 use crate::solution::Solution;
 use ondelette_compress::{Forest, NodeId};
+use ondelette_wavelet::cell::CellShape;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -184,8 +185,9 @@ impl Sampled {
         let lamps = Lamps::restore(&scene, &kernel, solution.settings().error, kept);
         let mut rays = 0;
         let mut points = 0;
+        let order = gather::coarsest(forest.basis(CellShape::Square));
         let gathers: Vec<Gather> =
-            kept.gathers.iter().map(|record| Gather::restore(kept, record, &mut points, &mut rays)).collect();
+            kept.gathers.iter().map(|record| Gather::restore((kept, order), record, &mut points, &mut rays)).collect();
         let streaming = kept.gathers.iter().any(|g| g[2] > Gather::FIRST && g[4] == 0);
         let mut sampled = Sampled {
             direct: kept.direct.clone(),
@@ -266,7 +268,7 @@ impl Gather {
     }
 
     /// The element of a record, whose points and samples begin at `point` and `sample`, which move on.
-    fn restore(kept: &Kept, record: &[u32; 7], point: &mut usize, sample: &mut usize) -> Gather {
+    fn restore((kept, order): (&Kept, usize), record: &[u32; 7], point: &mut usize, sample: &mut usize) -> Gather {
         let [node, count, drawn, halves @ ..] = *record;
         let own = *point..*point + count as usize;
         *point = own.end;
@@ -279,6 +281,6 @@ impl Gather {
             own.into_iter().map(|k| Ray::new(kept.leaves[k], kept.ends[k].map(f64::from))).collect()
         });
         let parts = [[a, c], [b, d]].map(Rays::of_halves);
-        Gather::of_parts(NodeId(node), points, open, drawn, parts)
+        Gather::of_parts((NodeId(node), order), (points, open), drawn, parts)
     }
 }

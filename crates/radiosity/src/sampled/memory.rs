@@ -6,19 +6,28 @@
 //! cap, with other rays: another answer that keeps the same promise.
 
 use super::direct::Known;
+use super::field::Form;
 use super::gather::{Draw, Gather};
-use super::points::Point;
-use super::rays::{Ray, Rays};
-use super::{Phase, Sampled};
+use super::rays::Ray;
+use super::verdict::Verdict;
+use super::{FIRST_DIRECTIONS, Phase, Sampled};
 use crate::solver::SolveError;
 use ondelette_compress::forest::Node;
 
-/// Working arrays of one number a function and channel, beside the lasting ones.
-const WORKING_ARRAYS: usize = 6;
+/// Arrays of a number a leaf's function and channel: the light, and what is read in a sweep.
+const LEAF_ARRAYS: usize = 2;
+/// Krylov vectors that a solve has at least.
+const LEAST_KRYLOV: usize = 6;
+/// Vectors of the gathered light at a time: the solution, what is added up, and the least of a solve.
+const WORKING_VECTORS: u64 = 7 + LEAST_KRYLOV as u64;
+/// What the allocator adds to each of the arrays of a gathering element.
+const BESIDE_AN_ARRAY: usize = 16;
 
 impl Sampled {
     /// Caps the counted bytes.
     pub(crate) fn limit_memory(&mut self, cap: u64) -> Result<(), SolveError> {
+        // what fits found out has no place under a cap
+        self.known = Vec::new();
         let least = self.bytes() + self.first_bytes();
         if least > cap {
             return Err(SolveError::Memory { cap, least });
@@ -30,14 +39,32 @@ impl Sampled {
     /// Bytes of elements, points and samples, and of the arrays that a sweep works in.
     pub(crate) fn bytes(&self) -> u64 {
         let (groups, stride) = (self.lamps.groups.len(), self.forest.stride());
-        let coefficients = stride * size_of::<[f64; 3]>();
         let node = size_of::<Node>()
             + groups * (stride * size_of::<f64>() + 2 * size_of::<f32>())
-            + 2 * size_of::<f32>()
-            + (1 + WORKING_ARRAYS) * coefficients;
-        let gathers: usize = self.gathers.iter().map(|g| g.bytes() + (1 + WORKING_ARRAYS) * coefficients).sum();
+            + size_of::<[f32; 2]>()
+            + LEAF_ARRAYS * stride * size_of::<[f64; 3]>()
+            + size_of::<Form>();
+        let beside = size_of::<Gather>() + size_of::<Verdict>() + size_of::<u32>();
+        let gather = |g: &Gather| {
+            let (bytes, arrays) = g.bytes();
+            beside + bytes + arrays * BESIDE_AN_ARRAY
+        };
+        let gathers: usize = self.gathers.iter().map(gather).sum();
         let known: usize = self.known.iter().flatten().map(Known::bytes).sum();
-        (self.forest.len() * (node + size_of::<Option<Known>>()) + known + gathers) as u64
+        let known = known + size_of_val(&self.known[..]);
+        (self.forest.len() * node + known + gathers) as u64 + WORKING_VECTORS * self.bytes_a_vector()
+    }
+
+    /// Bytes of one number a function in use of the gathering elements, and channel.
+    fn bytes_a_vector(&self) -> u64 {
+        (self.slots.len() * size_of::<[f64; 3]>()) as u64
+    }
+
+    /// Krylov vectors that there is room for, at most `most`; a few are always counted.
+    pub(super) fn krylov_vectors(&self, most: usize) -> usize {
+        let Some(cap) = self.cap else { return most };
+        let room = cap.saturating_sub(self.bytes()) / self.bytes_a_vector().max(1);
+        most.min(LEAST_KRYLOV + room as usize)
     }
 
     /// Bytes of scene and rays.
@@ -48,7 +75,7 @@ impl Sampled {
     /// Bytes of the first samples of all points, drawn or not.
     fn first_bytes(&self) -> u64 {
         let points: u64 = self.gathers.iter().map(|g| u64::from(g.points())).sum();
-        points * 2 * u64::from(Gather::FIRST) * size_of::<Ray>() as u64
+        points * 2 * u64::from(FIRST_DIRECTIONS) * size_of::<Ray>() as u64
     }
 
     /// Looks whether planned samples fit; if not, no more than the first of every element are stored from now on.
@@ -72,13 +99,5 @@ impl Sampled {
     pub(super) fn stop_for_memory(&mut self) {
         self.stalled = true;
         self.phase = Phase::Finished;
-    }
-}
-
-impl Gather {
-    /// Counted bytes.
-    fn bytes(&self) -> usize {
-        let samples: usize = self.parts().map(Rays::bytes).iter().sum();
-        size_of::<Gather>() + samples + self.points() as usize * (size_of::<Point>() + 1 + 4 * size_of::<f64>())
     }
 }

@@ -22,6 +22,7 @@ mod points;
 mod positive;
 mod rays;
 mod shares;
+mod slots;
 mod sphere;
 mod stitch;
 mod verdict;
@@ -44,6 +45,7 @@ use ondelette_compress::{Forest, Links, NodeId, transport};
 use ondelette_numerics::krylov::Gmres;
 use ondelette_numerics::par;
 use points::Grain;
+use slots::Slots;
 use std::sync::Arc;
 use verdict::Verdict;
 
@@ -107,8 +109,9 @@ pub(crate) struct Sampled {
     lit: Vec<f32>,
     gathers: Vec<Gather>,
     verdicts: Vec<Verdict>,
-    /// Indirect light: `[gather][function]`.
+    /// Indirect light of the gathering elements, and where it stands.
     indirect: Vec<[f64; 3]>,
+    slots: Slots,
     irradiance: Vec<[f64; 3]>,
     phase: Phase,
     counted_area: f64,
@@ -201,6 +204,7 @@ impl Sampled {
         gathers: Vec<Gather>,
     ) -> Self {
         let (nodes, stride) = (forest.len(), forest.stride());
+        let slots = Slots::of(&forest, &gathers);
         Sampled {
             direct: vec![0.0; nodes * stride * lamps.groups.len()],
             misfit: vec![0.0; nodes * lamps.groups.len()],
@@ -209,7 +213,8 @@ impl Sampled {
             known: vec![None; nodes],
             rays: vec![LEAST_LAMP_RAYS; nodes],
             verdicts: vec![Verdict::default(); gathers.len()],
-            indirect: vec![[0.0; 3]; gathers.len() * stride],
+            indirect: vec![[0.0; 3]; slots.len()],
+            slots,
             irradiance: vec![[0.0; 3]; nodes * stride],
             counted_area: counted_area(&scene, &kernel),
             scene,
@@ -295,7 +300,7 @@ impl Sampled {
         let batch = &nodes[done..done + count];
         let fits = par::map(count, |i| {
             let (n, cell) = (batch[i].index(), self.forest.node(batch[i]).cell);
-            let before = (f64::from(self.rays[n]), self.known[n].as_ref());
+            let before = (f64::from(self.rays[n]), self.known.get(n).and_then(Option::as_ref));
             direct::fit(&self.kernel, &self.lamps, &self.forest, &cell, before)
         });
         let (groups, stride) = (self.lamps.groups.len(), self.forest.stride());
@@ -311,8 +316,10 @@ impl Sampled {
             self.scatter[own].copy_from_slice(&fit.scatter);
             self.lit[id.index()] = fit.lit as f32;
             (0..2).for_each(|k| self.work[k] += fit.work[k]);
-            // a cap on memory has better use for it
-            self.known[id.index()] = fit.known.filter(|_| self.cap.is_none());
+            // a cap on memory has better use for it, and leaves it no place
+            if let Some(known) = self.known.get_mut(id.index()) {
+                *known = fit.known;
+            }
         }
         self.statistics.kernel_samples += count as u64;
         self.refitted = true;
@@ -333,7 +340,9 @@ impl Sampled {
         let mut fresh = Vec::new();
         for &id in leaves {
             self.forest.split(id);
-            self.known[id.index()] = None;
+            if let Some(known) = self.known.get_mut(id.index()) {
+                *known = None;
+            }
             let arity = self.forest.node(id).cell.shape.arity();
             fresh.extend((0..arity).map(|c| self.forest.child(id, c)));
             self.irradiance.resize(self.forest.len() * stride, [0.0; 3]);
@@ -344,7 +353,9 @@ impl Sampled {
         self.misfit.resize(self.forest.len() * groups, 0.0);
         self.scatter.resize(self.forest.len() * groups, 0.0);
         self.lit.resize(self.forest.len(), 1.0);
-        self.known.resize(self.forest.len(), None);
+        if self.cap.is_none() {
+            self.known.resize(self.forest.len(), None);
+        }
         // smaller elements need fewer rays
         for &id in &fresh {
             let parent = self.rays[self.forest.node(id).parent.index()];
@@ -384,12 +395,24 @@ impl Sampled {
     /// Brings samples up to date with the forest.
     fn prepare(&mut self) {
         let forest = &self.forest;
+        let before: Vec<&[u16]> = self.gathers.iter().map(|g| g.functions(forest)).collect();
         par::for_each_chunk(&mut self.gathers, 16, |_, gathers| {
             for gather in gathers {
                 gather.relocate(forest);
                 gather.prepare(forest.basis_of(gather.node));
             }
         });
+        // functions that are in use now have their places
+        let slots = Slots::of(forest, &self.gathers);
+        let mut indirect = Vec::with_capacity(slots.len());
+        let mut all = [[0.0; 3]; gather::MOST];
+        for (k, (gather, before)) in self.gathers.iter().zip(before).enumerate() {
+            let now = gather.functions(forest);
+            now.iter().for_each(|&i| all[usize::from(i)] = [0.0; 3]);
+            before.iter().zip(&self.indirect[self.slots.range(k)]).for_each(|(&i, v)| all[usize::from(i)] = *v);
+            indirect.extend(now.iter().map(|&i| all[usize::from(i)]));
+        }
+        (self.indirect, self.slots) = (indirect, slots);
     }
 
     // ---- balance
@@ -427,11 +450,18 @@ impl Sampled {
 
     /// Adds gathered light, pushed to the leaves, to `values`.
     fn add_indirect(&self, indirect: &[[f64; 3]], values: &mut [[f64; 3]]) {
+        let own = |k: usize| (self.gathers[k].functions(&self.forest), &indirect[self.slots.range(k)]);
+        self.add_gathered(own, values);
+    }
+
+    /// The same for functions of each gathering element and their coefficients.
+    fn add_gathered<'a>(&'a self, own: impl Fn(usize) -> (&'a [u16], &'a [[f64; 3]]), values: &mut [[f64; 3]]) {
         let stride = self.forest.stride();
         for (k, gather) in self.gathers.iter().enumerate() {
-            let own = &mut values[gather.node.index() * stride..(gather.node.index() + 1) * stride];
-            for (v, i) in own.iter_mut().zip(&indirect[k * stride..]) {
-                (0..3).for_each(|c| v[c] += i[c]);
+            let (functions, coefficients) = own(k);
+            for (&i, from) in functions.iter().zip(coefficients) {
+                let to = &mut values[gather.node.index() * stride + usize::from(i)];
+                (0..3).for_each(|c| to[c] += from[c]);
             }
         }
         transport::push(&self.forest, values);

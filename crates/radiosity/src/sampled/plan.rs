@@ -4,8 +4,9 @@
 //! (half the difference of two independent halves), and what the functions of the gathering elements cannot say (the
 //! product of both halves' misses, which is free of scatter on average).
 
-use super::gather::{Draw, Gather};
+use super::gather::{Draw, Gather, MOST};
 use super::shares::{Kind, shares, turning_point};
+use super::slots::Slots;
 use super::verdict::Verdict;
 use super::{FIRST_PRECISION, Phase, Sampled};
 use crate::solver::Event;
@@ -320,14 +321,13 @@ impl Sampled {
             .filter(|&id| self.forest.is_leaf(id))
             .collect();
         let fresh = self.split(&leaves);
-        let stride = self.forest.stride();
         let mut gathers: Vec<Gather> = Vec::with_capacity(self.gathers.len() + 3 * chosen.len());
         let mut indirect = Vec::with_capacity(self.indirect.len());
         let mut verdicts = Vec::with_capacity(self.verdicts.len());
         let mut draws = Vec::new();
         let mut chosen = chosen.into_iter().peekable();
         for (k, gather) in std::mem::take(&mut self.gathers).into_iter().enumerate() {
-            let own = &self.indirect[k * stride..(k + 1) * stride];
+            let own = &self.indirect[self.slots.range(k)];
             if chosen.next_if(|&c| c == k).is_none() {
                 gathers.push(gather);
                 indirect.extend_from_slice(own);
@@ -349,15 +349,16 @@ impl Sampled {
                 verdicts.push(self.verdicts[k]);
                 continue;
             }
-            let gather_points = gather.points();
+            let (gather_points, functions) = (gather.points(), basis.truncated(gather.order));
             for (c, (mut child, known)) in gather.split(&self.forest).into_iter().enumerate() {
                 child.stick_out(&self.kernel, &self.forest, known);
-                let mut values = vec![[0.0; 3]; stride];
+                let [mut parent, mut values] = [[[0.0; 3]; MOST]; 2];
+                functions.iter().zip(own).for_each(|(&i, v)| parent[usize::from(i)] = *v);
                 let n = basis.len();
-                basis.push(c, &own[..n], &mut values[..n], |to: &mut [f64; 3], k, from: [f64; 3]| {
+                basis.push(c, &parent[..n], &mut values[..n], |to: &mut [f64; 3], k, from: [f64; 3]| {
                     (0..3).for_each(|c| to[c] += k * from[c]);
                 });
-                indirect.extend(values);
+                indirect.extend(functions.iter().map(|&i| values[usize::from(i)]));
                 let points = known..child.points();
                 // fewer points for as many functions
                 let share = self.verdicts[k].share * (f64::from(gather_points) / f64::from(points.end)).sqrt();
@@ -369,6 +370,7 @@ impl Sampled {
             }
         }
         (self.gathers, self.indirect, self.verdicts) = (gathers, indirect, verdicts);
+        self.slots = Slots::of(&self.forest, &self.gathers);
         (fresh, draws)
     }
 

@@ -14,6 +14,35 @@ pub(super) struct Point {
     pub(super) key: u64,
 }
 
+/// Which of up to 64 points are marked.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Marks(u64);
+
+impl Marks {
+    /// Whether a point is.
+    pub(super) fn has(self, point: usize) -> bool {
+        self.0 >> point & 1 == 1
+    }
+
+    /// Marks one.
+    pub(super) fn add(&mut self, point: usize) {
+        self.0 |= 1 << point;
+    }
+
+    /// How many are.
+    pub(super) fn count(self) -> usize {
+        self.0.count_ones() as usize
+    }
+}
+
+impl FromIterator<bool> for Marks {
+    fn from_iter<I: IntoIterator<Item = bool>>(marks: I) -> Self {
+        let mut all = Marks::default();
+        marks.into_iter().enumerate().filter(|(_, marked)| *marked).for_each(|(p, _)| all.add(p));
+        all
+    }
+}
+
 /// How many points an element gathers at, at first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Grain {

@@ -7,6 +7,7 @@
 //! scatter, or the element would have been split.
 
 use super::gather::{Gather, MOST};
+use super::slots::Slots;
 use ondelette_compress::{Forest, NodeId};
 use ondelette_wavelet::cell::CellShape;
 
@@ -19,12 +20,12 @@ const ALIKE: f64 = 3.0;
 /// Values of a field and of half the difference of its halves, by channel.
 type Values = [[f64; 3]; 2];
 
-/// The same field with its corners averaged: coefficients in the order of `gathers`; and half the difference of its
+/// The same field with its corners averaged: coefficients of all functions in the order of `gathers`; and half the difference of its
 /// halves, treated alike. Parallelograms with bases of the second order only; others, and elements partly inside of
 /// something, are left as they are.
 pub(super) fn stitched(
     forest: &Forest,
-    gathers: &[Gather],
+    (gathers, slots): (&[Gather], &Slots),
     fields: [&[[f64; 3]]; 2],
     noise: impl Fn(usize) -> f64,
 ) -> [Vec<[f64; 3]>; 2] {
@@ -33,7 +34,14 @@ pub(super) fn stitched(
     let mut of_node = vec![u32::MAX; forest.len()];
     gathers.iter().enumerate().for_each(|(k, gather)| of_node[gather.node.index()] = k as u32);
     let basis = forest.basis(CellShape::Square);
-    let mut out = fields.map(<[_]>::to_vec);
+    let mut out = fields.map(|field| {
+        let mut full = vec![[0.0; 3]; gathers.len() * stride];
+        for (k, gather) in gathers.iter().enumerate() {
+            let own = gather.functions(forest).iter().zip(&field[slots.range(k)]);
+            own.for_each(|(&i, v)| full[k * stride + usize::from(i)] = *v);
+        }
+        full
+    });
     if !basis.is_nested() || basis.order() != 2 {
         return out;
     }
@@ -55,7 +63,8 @@ pub(super) fn stitched(
         let mut functions = [0.0; MOST];
         basis.eval(x, &mut functions);
         let sum = |sum: [f64; 3], (c, f): (&[f64; 3], &f64)| std::array::from_fn(|i| sum[i] + c[i] * f);
-        let own = |field: &[[f64; 3]]| field[k * stride..].iter().zip(&functions[..basis.len()]).fold([0.0; 3], sum);
+        let index = gathers[k].functions(forest).iter().map(|&i| &functions[usize::from(i)]);
+        let own = |field: &[[f64; 3]]| field[slots.range(k)].iter().zip(index.clone()).fold([0.0; 3], sum);
         Some((k, fields.map(own)))
     };
     let analysis = basis.analysis(2);
