@@ -81,6 +81,11 @@ impl Forest {
         id
     }
 
+    /// Makes room for so many more nodes, and no more.
+    pub fn reserve(&mut self, nodes: usize) {
+        self.nodes.reserve_exact(nodes);
+    }
+
     /// First child of a node, made (with its siblings) if it was a leaf.
     ///
     /// # Panics

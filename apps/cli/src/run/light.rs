@@ -126,7 +126,7 @@ fn write_outputs(
     for output in quick {
         progress.stage(&format!("writing {}", output.path.display()), 0.0);
         match output.kind {
-            Kind::Solution if record.plan.keep => write_solution(&output.path, solution)?,
+            Kind::Solution if record.plan.keep || solution.kept().is_none() => write_solution(&output.path, solution)?,
             Kind::Solution => write_solution(&output.path, &solution.clone().without_kept())?,
             Kind::Tables => {
                 write_tables(&output.path, solution)?;

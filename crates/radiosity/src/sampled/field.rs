@@ -49,6 +49,7 @@ pub(super) fn bilinear(forest: &Forest, coefficients: &[[f64; 3]], out: &mut Vec
         }
         sum.map(|of| of.map(|v| v as f32))
     };
+    out.reserve_exact(forest.len());
     out.extend(forest.nodes().iter().zip(coefficients.chunks(stride)).map(form));
 }
 

@@ -337,7 +337,14 @@ impl Sampled {
     /// Splits leaves: children take over what is known, and are to be fitted.
     fn split(&mut self, leaves: &[NodeId]) -> Vec<NodeId> {
         let (groups, stride) = (self.lamps.groups.len(), self.forest.stride());
-        let mut fresh = Vec::new();
+        // not a byte more than is counted
+        let more: usize = leaves.iter().map(|&id| self.forest.node(id).cell.shape.arity()).sum();
+        self.forest.reserve(more);
+        self.irradiance.reserve_exact(more * stride);
+        self.direct.reserve_exact(more * groups * stride);
+        [&mut self.misfit, &mut self.scatter].into_iter().for_each(|v| v.reserve_exact(more * groups));
+        [&mut self.lit, &mut self.rays].into_iter().for_each(|v| v.reserve_exact(more));
+        let mut fresh = Vec::with_capacity(more);
         for &id in leaves {
             self.forest.split(id);
             if let Some(known) = self.known.get_mut(id.index()) {
@@ -434,6 +441,7 @@ impl Sampled {
     fn direct_light(&self, mut values: Vec<[f64; 3]>) -> Vec<[f64; 3]> {
         let (groups, stride) = (self.lamps.groups.len(), self.forest.stride());
         values.clear();
+        values.reserve_exact(self.forest.len() * stride);
         values.resize(self.forest.len() * stride, [0.0; 3]);
         for (n, node) in self.forest.nodes().iter().enumerate() {
             if node.first_child == 0 {
