@@ -122,7 +122,8 @@ fn widen(v: Vec3A) -> DVec3 {
 impl Occluders {
     /// Bytes of patches and hierarchies.
     pub fn bytes(&self) -> u64 {
-        let corners: usize = self.corners.iter().map(|c| size_of_val(c) + size_of_val(&**c)).sum();
+        // and what the allocator adds to each
+        let corners: usize = self.corners.iter().map(|c| size_of_val(c) + size_of_val(&**c) + 16).sum();
         let wide = size_of_val(&*self.wide.nodes) + size_of_val(&*self.wide.primitive_indices);
         let binary = &self.binary;
         let indices = [&binary.primitive_indices, &binary.primitives_to_nodes, &binary.parents];

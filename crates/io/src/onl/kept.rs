@@ -9,7 +9,7 @@ pub(super) fn has(file: &ChunkFile) -> bool {
     file.has("k.groups")
 }
 
-pub(super) fn add(writer: &mut ChunkWriter, kept: &Kept) {
+pub(super) fn add<'a>(writer: &mut ChunkWriter<'a>, kept: &'a Kept) {
     writer.add_array("k.groups", &kept.groups);
     writer.add_array("k.lamps", &kept.lamps);
     writer.add_array("k.direct", &kept.direct);

@@ -64,7 +64,7 @@ mod tests {
         Settings { basis: "m2".into(), error: 0.01, levels: vec![1, 2, 3] }
     }
 
-    fn sample() -> ChunkWriter {
+    fn sample() -> ChunkWriter<'static> {
         let mut writer = ChunkWriter::new();
         writer.add_struct("settings", &settings()).unwrap();
         writer.add_array("coeffs", &[1.5f64, -0.0, 1e-300]);

@@ -64,7 +64,7 @@ pub fn read_solution(path: &Path) -> Result<Solution, OnlError> {
     solution_of(&ChunkFile::read(path)?)
 }
 
-fn chunks(solution: &Solution) -> ChunkWriter {
+fn chunks(solution: &Solution) -> ChunkWriter<'_> {
     let forest = solution.forest();
     let links: Vec<LinkRecord> = solution
         .links()
@@ -88,7 +88,7 @@ fn chunks(solution: &Solution) -> ChunkWriter {
     writer.add_struct("scene", &**solution.scene()).expect(encodable);
     writer.add_struct("settings", &solution.settings()).expect(encodable);
     writer.add_struct("counts", solution.statistics()).expect(encodable);
-    writer.add_array("splits", &splits(forest));
+    writer.add_bytes("splits", bytemuck::cast_slice(&splits(forest)).to_vec());
     writer.add_array("coeffs", solution.coefficients().as_flattened());
     if solution.lit().iter().any(|l| *l != 1.0) {
         writer.add_array("lit", solution.lit());
@@ -96,7 +96,7 @@ fn chunks(solution: &Solution) -> ChunkWriter {
     if !solution.errors().is_empty() {
         writer.add_array("errors", solution.errors());
     }
-    writer.add_array("links", &links);
+    writer.add_bytes("links", bytemuck::cast_slice(&links).to_vec());
     writer.add_array("blocks", solution.links().blocks());
     if let Some(samples) = solution.kept() {
         kept::add(&mut writer, samples);

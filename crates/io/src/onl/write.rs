@@ -4,6 +4,7 @@ use super::{ALIGNMENT, ENTRY, HEADER, MAGIC, VERSION, table_checksum};
 use crate::write::{AtomicFile, WriteError};
 use bytemuck::NoUninit;
 use serde::Serialize;
+use std::borrow::Cow;
 use std::io::{self, Write};
 use std::path::Path;
 use xxhash_rust::xxh3::xxh3_64;
@@ -23,22 +24,22 @@ use xxhash_rust::xxh3::xxh3_64;
 /// assert_eq!(file.finite_f64("coeffs").unwrap(), [1.0, 2.5]);
 /// ```
 #[derive(Clone, Debug, Default)]
-pub struct ChunkWriter {
-    chunks: Vec<([u8; 8], Vec<u8>)>,
+pub struct ChunkWriter<'a> {
+    chunks: Vec<([u8; 8], Cow<'a, [u8]>)>,
 }
 
-impl ChunkWriter {
+impl<'a> ChunkWriter<'a> {
     /// A container without chunks.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Adds a chunk of raw bytes.
+    /// Adds a chunk of raw bytes, its own or lent.
     ///
     /// # Panics
     /// If the name is empty, longer than eight bytes, not printable ASCII, or used before.
     #[track_caller]
-    pub fn add_bytes(&mut self, name: &str, bytes: Vec<u8>) {
+    pub fn add_bytes(&mut self, name: &str, bytes: impl Into<Cow<'a, [u8]>>) {
         assert!(
             (1..=8).contains(&name.len()) && name.bytes().all(|b| b.is_ascii_graphic()),
             "a chunk name has one to eight printable ASCII characters, not {name:?}"
@@ -46,7 +47,7 @@ impl ChunkWriter {
         let mut padded = [0; 8];
         padded[..name.len()].copy_from_slice(name.as_bytes());
         assert!(self.chunks.iter().all(|c| c.0 != padded), "chunk '{name}' is added twice");
-        self.chunks.push((padded, bytes));
+        self.chunks.push((padded, bytes.into()));
     }
 
     /// Adds a structure in the postcard encoding.
@@ -63,13 +64,14 @@ impl ChunkWriter {
         Ok(())
     }
 
-    /// Adds an array of numbers or of padding-free records (`f64`, `f32`, `u32`, ...), little-endian.
+    /// Adds an array of numbers or of padding-free records (`f64`, `f32`, `u32`, ...), little-endian, which is not
+    /// copied.
     ///
     /// # Panics
     /// As [`ChunkWriter::add_bytes`].
     #[track_caller]
-    pub fn add_array<T: NoUninit>(&mut self, name: &str, values: &[T]) {
-        self.add_bytes(name, bytemuck::cast_slice(values).to_vec());
+    pub fn add_array<T: NoUninit>(&mut self, name: &str, values: &'a [T]) {
+        self.add_bytes(name, bytemuck::cast_slice::<T, u8>(values));
     }
 
     /// The bytes of the file: a function of the chunks alone. Cost O(bytes).

@@ -165,7 +165,7 @@ impl Sampled {
         let mut kept = Kept {
             groups: self.lamps.groups.iter().map(|g| g.0).collect(),
             lamps: self.lamps.sides().collect(),
-            direct: std::mem::take(&mut self.direct),
+            direct: std::mem::take(&mut self.direct).into_iter().map(f64::from).collect(),
             misfit: std::mem::take(&mut self.misfit),
             scatter: std::mem::take(&mut self.scatter),
             lamp_rays: std::mem::take(&mut self.rays),
@@ -190,7 +190,7 @@ impl Sampled {
             kept.gathers.iter().map(|record| Gather::restore((kept, order), record, &mut points, &mut rays)).collect();
         let streaming = kept.gathers.iter().any(|g| g[2] > Gather::FIRST && g[4] == 0);
         let mut sampled = Sampled {
-            direct: kept.direct.clone(),
+            direct: kept.direct.iter().map(|d| *d as f32).collect(),
             misfit: kept.misfit.clone(),
             scatter: kept.scatter.clone(),
             rays: kept.lamp_rays.clone(),

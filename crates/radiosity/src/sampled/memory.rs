@@ -17,22 +17,24 @@ use ondelette_compress::forest::Node;
 /// Arrays of a number a leaf's function and channel: the light, and what is read in a sweep.
 const LEAF_ARRAYS: usize = 2;
 /// Krylov vectors that a solve has at least.
-const LEAST_KRYLOV: usize = 6;
+const LEAST_KRYLOV: usize = 4;
 /// Vectors of the gathered light at a time: the solution, what is added up, and the least of a solve.
 const WORKING_VECTORS: u64 = 7 + LEAST_KRYLOV as u64;
 /// What the allocator adds to each of the arrays of a gathering element.
 const BESIDE_AN_ARRAY: usize = 16;
+/// Share of what is allowed that is counted on: between arrays that grow, some is lost.
+const COUNTED: f64 = 0.95;
 
 impl Sampled {
     /// Caps the counted bytes.
     pub(crate) fn limit_memory(&mut self, cap: u64) -> Result<(), SolveError> {
         // what fits found out has no place under a cap
         self.known = Vec::new();
-        let least = self.bytes() + self.first_bytes();
+        let least = ((self.bytes() + self.first_bytes()) as f64 / COUNTED) as u64;
         if least > cap {
             return Err(SolveError::Memory { cap, least });
         }
-        self.cap = Some(cap);
+        self.cap = Some((COUNTED * cap as f64) as u64);
         Ok(())
     }
 
@@ -40,7 +42,7 @@ impl Sampled {
     pub(crate) fn bytes(&self) -> u64 {
         let (groups, stride) = (self.lamps.groups.len(), self.forest.stride());
         let node = size_of::<Node>()
-            + groups * (stride * size_of::<f64>() + 2 * size_of::<f32>())
+            + groups * (stride + 2) * size_of::<f32>()
             + size_of::<[f32; 2]>()
             + LEAF_ARRAYS * stride * size_of::<[f64; 3]>()
             + size_of::<Form>();
@@ -60,10 +62,10 @@ impl Sampled {
         (self.slots.len() * size_of::<[f64; 3]>()) as u64
     }
 
-    /// Krylov vectors that there is room for, at most `most`; a few are always counted.
+    /// Krylov vectors that half of what room there is holds, at most `most`; a few are always counted.
     pub(super) fn krylov_vectors(&self, most: usize) -> usize {
         let Some(cap) = self.cap else { return most };
-        let room = cap.saturating_sub(self.bytes()) / self.bytes_a_vector().max(1);
+        let room = cap.saturating_sub(self.bytes()) / (2 * self.bytes_a_vector().max(1));
         most.min(LEAST_KRYLOV + room as usize)
     }
 

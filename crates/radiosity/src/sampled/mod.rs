@@ -95,8 +95,8 @@ pub(crate) struct Sampled {
     kernel: LightKernel,
     lamps: Lamps,
     forest: Forest,
-    /// Direct light for unit exitance: `[node][group][function]`.
-    direct: Vec<f64>,
+    /// Direct light for unit exitance, at most about 1: `[node][group][function]`.
+    direct: Vec<f32>,
     /// Mean absolute misfit of the direct light of each leaf, for unit exitance: `[node][group]`.
     misfit: Vec<f32>,
     /// Scatter of the direct light of each leaf, where rays decide what is seen, likewise.
@@ -309,7 +309,8 @@ impl Sampled {
             let n = basis.len();
             let own = &mut self.direct[id.index() * groups * stride..(id.index() + 1) * groups * stride];
             for g in 0..groups {
-                own[g * stride..g * stride + n].copy_from_slice(&fit.coefficients[g * n..(g + 1) * n]);
+                let fitted = fit.coefficients[g * n..(g + 1) * n].iter().map(|c| *c as f32);
+                own[g * stride..g * stride + n].iter_mut().zip(fitted).for_each(|(own, c)| *own = c);
             }
             let own = id.index() * groups..(id.index() + 1) * groups;
             self.misfit[own.clone()].copy_from_slice(&fit.misfit);
@@ -447,7 +448,7 @@ impl Sampled {
             if node.first_child == 0 {
                 for (g, (_, exitance)) in self.lamps.groups.iter().enumerate() {
                     for j in 0..stride {
-                        let d = self.direct[(n * groups + g) * stride + j];
+                        let d = f64::from(self.direct[(n * groups + g) * stride + j]);
                         (0..3).for_each(|c| values[n * stride + j][c] += exitance.0[c] * d);
                     }
                 }
@@ -526,7 +527,7 @@ impl Sampled {
                 let basis = self.forest.basis(node.cell.shape);
                 let own = self.direct[n * groups * stride..].chunks(stride).zip(&self.lamps.groups);
                 let mean = own.map(|(d, (_, exitance))| {
-                    exitance.sum() * basis.mean(&d[..basis.len()], 0.0, |a, b: f64, k| a + b * k)
+                    exitance.sum() * f64::from(basis.mean(&d[..basis.len()], 0.0, |a, b: f32, k| a + b * k as f32))
                 });
                 sum += node.measure * f64::from(self.lit[n]) * mean.sum::<f64>();
             }

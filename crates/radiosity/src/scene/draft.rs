@@ -225,7 +225,8 @@ impl SceneDraft {
         if options.two_sided {
             self.materials.iter_mut().for_each(|m| m.two_sided = true);
         }
-        let (patches, divided) = cut::cut(self.patches(&mut warnings));
+        let (mut patches, divided) = cut::cut(self.patches(&mut warnings));
+        patches.shrink_to_fit();
         if divided > 0 {
             let (s, are) = if divided == 1 { ("", "is") } else { ("es", "are") };
             warnings.push(format!(
@@ -254,6 +255,7 @@ impl SceneDraft {
         if camera != self.camera {
             warnings.push("the camera of the file is not usable (no direction, or no field of view): ignored".into());
         }
+        sides.shrink_to_fit();
         Ok(Scene {
             name: self.name,
             unit: self.unit,

@@ -251,8 +251,9 @@ impl Scene {
         let names = |length: usize| length + size_of::<String>();
         let materials = self.materials.iter().map(|m| size_of::<Material>() + m.name.len()).sum::<usize>();
         let objects = self.objects.iter().map(|o| size_of::<Object>() + o.name.len()).sum::<usize>();
-        let patches =
-            self.patches.iter().map(|p| size_of::<Patch>() + size_of_val(&*p.provenance.faces)).sum::<usize>();
+        // beside the faces of each, what the allocator adds and rounds up to
+        let faces = |p: &Patch| (size_of_val(&*p.provenance.faces) + 8).next_multiple_of(16).max(32);
+        let patches = self.patches.iter().map(|p| size_of::<Patch>() + faces(p)).sum::<usize>();
         let warnings = self.warnings.iter().map(|w| names(w.len())).sum::<usize>();
         (size_of::<Scene>() + materials + objects + patches + size_of_val(&*self.sides) + warnings) as u64
     }
