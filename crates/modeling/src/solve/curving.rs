@@ -7,6 +7,7 @@
 //! times more than the forces, an exact penalty, compared with the worst of the last few shapes (Grippo, Lampariello
 //! and Lucidi 1986) because curved constraints make good whole steps look bad.
 
+use super::auto::fits;
 use super::refine::{SolveError, Solver, Stage, fresh_sides};
 use crate::constraint::{Demand, Row, curvature};
 use std::sync::Arc;
@@ -160,6 +161,11 @@ impl Solver {
                 return Ok(self.give_up(&curving.from));
             }
         };
+        // Rows of curvature couple coordinates that had a matrix each.
+        if let Err(e) = blocks.iter().try_for_each(|b| fits(&b.structure, self.method)) {
+            self.notes.push(e.to_string());
+            return Ok(self.give_up(&curving.from));
+        }
         self.newton += 1;
         self.curving = Some(curving);
         self.sides = fresh_sides(&blocks);

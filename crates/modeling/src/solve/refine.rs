@@ -82,9 +82,9 @@ pub struct Solver {
     pub(super) problem: Problem,
     pub(super) settings: Settings,
     pub(super) method: Method,
-    why: &'static str,
+    pub(super) why: &'static str,
     /// What a choice by rule gives way to if it does not converge.
-    spare: Option<(Method, &'static str)>,
+    pub(super) spare: Option<(Method, &'static str)>,
     pub(super) h: Arc<Operator>,
     pub(super) blocks: Vec<(Arc<Structure>, Block)>,
     pub(super) notes: Vec<String>,
@@ -110,9 +110,9 @@ pub struct Solver {
 pub(crate) struct SideState {
     pub(crate) x: Vec<f64>,
     pub(crate) multipliers: Vec<f64>,
-    corrections: usize,
-    change: f64,
-    miss: f64,
+    pub(super) corrections: usize,
+    pub(super) change: f64,
+    pub(super) miss: f64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -311,21 +311,6 @@ impl Solver {
             self.judge_curvature();
             self.stage = Stage::Finished;
         }
-    }
-
-    /// Starts anew with the spare method, if there is one.
-    fn give_way(&mut self) -> bool {
-        let Some((method, why)) = self.spare.take() else { return false };
-        (self.method, self.why) = (method, why);
-        for side in self.sides.iter_mut().flatten() {
-            side.x.fill(0.0);
-            side.multipliers.fill(0.0);
-            (side.corrections, side.change, side.miss) = (0, f64::INFINITY, f64::INFINITY);
-        }
-        self.correctors.iter_mut().for_each(|c| *c = None);
-        self.at = (0, 0);
-        self.stage = Stage::Residual;
-        true
     }
 
     /// Names of the constraints that take part in redundant rows: what holds one holds the others.
