@@ -6,7 +6,7 @@
 use super::cholesky::dot;
 use super::correct::Correct;
 use crate::energy::Operator;
-use crate::system::Structure;
+use crate::system::{Structure, sight};
 use faer::linalg::solvers::Solve;
 use faer::sparse::linalg::solvers::Llt;
 use faer::sparse::{SparseColMat, Triplet};
@@ -55,7 +55,9 @@ fn loose(null: &[Vec<f64>], structure: &Structure, stiffness: &[f64], size: f64)
         for z in null {
             let mut shape = vec![0.0; structure.unknowns()];
             shape[c * structure.n..][..structure.n].copy_from_slice(z);
-            let rows = stiffness.iter().enumerate().map(|(r, s)| s.sqrt() * structure.apply_row(r, &shape)).collect();
+            let most = z.iter().fold(0.0, |m: f64, z| m.max(z.abs()));
+            let value = |r: usize| sight(structure.apply_row(r, &shape), structure.size(r, c) * most);
+            let rows = stiffness.iter().enumerate().map(|(r, s)| s.sqrt() * value(r)).collect();
             let mut one = Loose { shape, rows, square: 0.0 };
             clear(&mut one, firm.iter());
             if one.square > LOOSE * size * dot(&one.shape, &one.shape) {

@@ -41,6 +41,15 @@ pub(crate) struct Block {
     pub(crate) sides: Vec<Side>,
 }
 
+/// Sums that ought to cancel leave less than this share of what is summed.
+const CANCELLED: f64 = 1e-14;
+
+/// What a row sees of a shape of no energy, an entry of `A Z`: nothing where that is only the rounding of a sum of terms of
+/// this size. (Slopes and images do not see constants; solvers scale up what is small everywhere.)
+pub(crate) fn sight(value: f64, size: f64) -> f64 {
+    if value.abs() <= CANCELLED * size { 0.0 } else { value }
+}
+
 impl Structure {
     fn new(n: usize, k: usize, rows: &[Row], local: &dyn Fn(usize) -> usize) -> Structure {
         let mut out = Structure {
@@ -123,6 +132,12 @@ impl Structure {
     pub(crate) fn apply_row(&self, r: usize, x: &[f64]) -> f64 {
         let (columns, values) = self.row(r);
         columns.iter().zip(values).map(|(c, v)| v * x[*c as usize]).sum()
+    }
+
+    /// The sum of the entries' sizes of one row and coordinate, before any cancel.
+    pub(crate) fn size(&self, r: usize, c: usize) -> f64 {
+        let own = self.terms[r].iter().filter(|t| t.0 == c);
+        own.map(|(_, f, by)| self.functionals[*f].entries().map(|(_, v)| (by * v).abs()).sum::<f64>()).sum()
     }
 
     /// `y = A x`.

@@ -1,0 +1,63 @@
+//! Well-formed problems of unusual shape: solved like others, or said not to be.
+
+use ondelette_modeling::Axis;
+use ondelette_modeling::constraint::{Constraint, Demand};
+use ondelette_modeling::energy::Energy;
+use ondelette_modeling::solve::{Method, Oracle, Settings, Solution, Solver};
+use ondelette_modeling::system::{Problem, Space};
+use ondelette_wavelet::Boundary;
+
+fn surface(boundary: Boundary, spans: usize) -> Space {
+    let axis = Axis::new(boundary, spans, [0.0, 1.0]).unwrap();
+    Space::surface(axis, axis)
+}
+
+fn slope(id: &str, at: [f64; 2], axis: usize, by: f64) -> Constraint {
+    Constraint::new(id, &at, Demand::Derivative(axis, vec![Some(by)]))
+}
+
+fn run(problem: &Problem, method: Method) -> Solution {
+    let settings = Settings { method, ..Settings::default() };
+    Solver::new(problem.clone(), settings).and_then(Solver::run).unwrap()
+}
+
+#[test]
+fn slopes_and_images_alone_are_enough_for_every_solver() {
+    let slopes = vec![
+        slope("a", [0.37, 0.41], 0, 1.0),
+        slope("b", [0.37, 0.41], 1, 0.5),
+        slope("c", [0.77, 0.21], 0, -1.0),
+        slope("d", [0.77, 0.21], 1, 0.5),
+    ];
+    let image = |id: &str, at: [f64; 2], of: [f64; 2]| {
+        Constraint::new(id, &at, Demand::Image { of: of.to_vec(), factors: vec![1.0], offset: vec![0.33] })
+    };
+    let images = vec![image("near", [0.2, 0.3], [0.2, 0.3001]), image("far", [0.1, 0.2], [0.7, 0.8])];
+    let soft = vec![slope("soft", [0.73, 0.74], 1, 190.0).soft(1e4)];
+    for (name, rows) in [("slopes", &slopes), ("images", &images), ("soft", &soft)] {
+        for boundary in [Boundary::Open, Boundary::Mirrored, Boundary::Periodic] {
+            for spans in [16, 32] {
+                let energy = Energy::new(0.1, 1.0, 0.0).unwrap();
+                let problem = Problem::new(surface(boundary, spans), 1, energy, None, rows.clone()).unwrap();
+                let with_soft = |s: &Solution| {
+                    let soft = |r: &&ondelette_modeling::solve::Residual| r.soft;
+                    s.energy() + s.residuals().iter().filter(soft).map(|r| 1e4 * r.miss.powi(2)).sum::<f64>()
+                };
+                let want = run(&problem, Method::Cholesky);
+                assert!(want.converged(), "{name} {boundary:?} {spans}: {:?}", want.notes());
+                let mut methods = vec![Method::Auto, Method::Bpx, Method::Multigrid, Method::Wavelet];
+                methods.extend((boundary != Boundary::Open).then_some(Method::Spectral));
+                for method in methods {
+                    let found = run(&problem, method);
+                    let over = with_soft(&found) / with_soft(&want) - 1.0;
+                    assert!(found.converged(), "{name} {boundary:?} {spans} {method}: {:?}", found.notes());
+                    assert!(over.abs() < 1e-6, "{name} {boundary:?} {spans} {method}: {over:e}");
+                }
+                let few = Oracle::new(problem, 1e-3).and_then(Oracle::run).unwrap();
+                let over = with_soft(&few) / with_soft(&want) - 1.0;
+                assert!(few.converged(), "{name} {boundary:?} {spans} adaptive: {:?}", few.notes());
+                assert!((-1e-6..1e-3).contains(&over), "{name} {boundary:?} {spans} adaptive: {over:e}");
+            }
+        }
+    }
+}
