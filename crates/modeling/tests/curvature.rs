@@ -202,3 +202,42 @@ fn a_row_that_is_missed_is_named_whatever_the_solver_says() {
         }
     }
 }
+
+#[test]
+fn who_stops_early_keeps_the_last_good_shape() {
+    // Two bends that contradict each other keep the solver busy.
+    let rows = [
+        at("a", 0.0, &[0.0, 0.0]),
+        at("b", 0.5, &[1.0, 1.0]),
+        at("c", 1.0, &[2.0, 0.0]),
+        bent("k", 0.25, 3.0),
+        bent("l", 0.2501, -4.0),
+    ];
+    let axis = Axis::new(Boundary::Open, 128, [0.0, 1.0]).unwrap();
+    let problem = || Problem::new(Space::curve(axis), 2, Energy::BEND, None, rows.to_vec()).unwrap();
+    let points = |found: &Solution| {
+        let ends = found.residuals().iter().filter(|r| ["a", "b", "c"].contains(&&r.id[..]));
+        ends.fold(0.0, |m: f64, r| m.max(r.miss.abs()))
+    };
+    let settings = Settings { method: Method::Wavelet, ..Settings::default() };
+    let mut solver = Solver::new(problem(), settings).unwrap();
+    let mut begun = None;
+    for _ in 0..2000 {
+        if solver.step().is_none() {
+            break;
+        }
+        let found = solver.solution();
+        if begun.is_none() && points(&found) < 1e-7 {
+            begun = Some(found.iterations());
+        }
+        let kept = points(&found) < 1e-7 && found.energy() > 1.0;
+        assert!(begun.is_none() || kept, "{:e} after {}", points(&found), found.iterations());
+    }
+    // So does the limit of iterations.
+    let begun = begun.unwrap();
+    for more in [0, 1, 20, 50, 100] {
+        let settings = Settings { most_iterations: begun + more, ..settings };
+        let found = Solver::new(problem(), settings).and_then(Solver::run).unwrap();
+        assert!(!found.converged() && points(&found) < 1e-7, "{more} more than {begun}: {:e}", points(&found));
+    }
+}

@@ -15,7 +15,7 @@ use std::sync::Arc;
 /// The shape that the current program is linear around, and what is remembered of those before it.
 #[derive(Debug, Default)]
 pub(super) struct Curving {
-    from: Vec<Vec<f64>>,
+    pub(super) from: Vec<Vec<f64>>,
     /// Energies and misses of the last shapes, the newest last.
     last: Vec<(f64, Vec<f64>)>,
     /// Price of a miss, constraint by constraint.
@@ -66,7 +66,7 @@ impl Solver {
         if !self.problem.constraints().iter().any(|c| matches!(c.demand, Demand::Curvature(_))) {
             return Ok(false);
         }
-        let to = self.coefficients();
+        let to = self.stacked();
         let finite = to.iter().flatten().all(|v| v.is_finite());
         let Some(mut curving) = self.curving.take() else {
             if !self.converged || !finite {
@@ -177,7 +177,7 @@ impl Solver {
     }
 
     /// Back to the last good shape, which meets all but curvature; says what is missed.
-    fn give_up(&mut self, shape: &[Vec<f64>]) -> bool {
+    pub(super) fn give_up(&mut self, shape: &[Vec<f64>]) -> bool {
         let n = self.problem.space().len();
         for ((_, block), sides) in self.blocks.iter().zip(&mut self.sides) {
             for (side, state) in block.sides.iter().zip(sides) {

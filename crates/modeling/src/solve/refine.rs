@@ -305,11 +305,15 @@ impl Solver {
             }
         }
         if stop {
+            self.stage = Stage::Finished;
+            if let Some(curving) = self.curving.take() {
+                self.give_up(&curving.from);
+                return;
+            }
             // Sides that had no turn are zero.
-            self.converged &= self.at.0 >= self.blocks.len() && self.curving.is_none();
+            self.converged &= self.at.0 >= self.blocks.len();
             self.judge();
             self.judge_curvature();
-            self.stage = Stage::Finished;
         }
     }
 
@@ -318,8 +322,16 @@ impl Solver {
         self.tied.iter().map(|c| self.problem.constraints()[*c].id.clone()).collect()
     }
 
-    /// The coefficients so far, coordinate by coordinate.
+    /// The coefficients so far, coordinate by coordinate; while curvature is being met, those of the last whole step.
     pub fn coefficients(&self) -> Vec<Vec<f64>> {
+        match &self.curving {
+            Some(curving) => curving.from.clone(),
+            None => self.stacked(),
+        }
+    }
+
+    /// The coefficients of all sides.
+    pub(super) fn stacked(&self) -> Vec<Vec<f64>> {
         let n = self.problem.space().len();
         let mut coefficients = vec![vec![0.0; n]; self.problem.coordinates()];
         for ((_, block), sides) in self.blocks.iter().zip(&self.sides) {
