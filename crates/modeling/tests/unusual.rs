@@ -61,3 +61,25 @@ fn slopes_and_images_alone_are_enough_for_every_solver() {
         }
     }
 }
+
+#[test]
+fn a_coordinate_that_is_zero_is_as_good_as_any() {
+    let at = |id: &str, t: f64, x: f64, y: f64| {
+        Constraint::new(id, &[t], Demand::Position(vec![Some(x), Some(y)]))
+    };
+    // What is soft would pull y away from zero, but is at a point that is held there.
+    let pulled = at("soft", 0.3, 1.0, 0.1).soft(1e6);
+    let rows = vec![at("a", 0.0, 0.0, 0.0), at("b", 0.3, 1.0, 0.0), at("c", 1.0, 2.0, 0.0), pulled];
+    for boundary in [Boundary::Mirrored, Boundary::Open] {
+        let space = Space::curve(Axis::new(boundary, 32, [0.0, 1.0]).unwrap());
+        for energy in [Energy::BEND, Energy::new(1.0, 1.0, 0.0).unwrap()] {
+            let problem = Problem::new(space.clone(), 2, energy, None, rows.clone()).unwrap();
+            for method in [Method::Auto, Method::Bpx, Method::Multigrid, Method::Wavelet, Method::Cholesky] {
+                let found = run(&problem, method);
+                assert!(found.converged(), "{boundary:?} {method}: {:?}", found.notes());
+                let y = found.coefficients()[1].iter().fold(0.0, |m: f64, y| m.max(y.abs()));
+                assert!(y < 1e-9, "{boundary:?} {method}: {y:e}");
+            }
+        }
+    }
+}

@@ -262,6 +262,8 @@ impl Solver {
         let (dx, dl) = corrector.correction();
         let finite = dx.iter().all(|v| v.is_finite());
         let allowed = verdict::allowed(self.settings.tolerance, verdict::scale(&self.problem, &self.blocks));
+        // A coordinate that is zero beside others has only their size to be judged by.
+        let least = 1e-6 * verdict::largest(&self.problem, &self.blocks);
         let (structure, block) = &self.blocks[b];
         let targets = &block.sides[s].targets;
         let side = &mut self.sides[b][s];
@@ -270,7 +272,7 @@ impl Solver {
             side.x.iter_mut().zip(dx).for_each(|(x, d)| *x += d);
             side.multipliers.iter_mut().zip(dl).for_each(|(l, d)| *l += d);
         }
-        let size = max(&side.x).max(f64::MIN_POSITIVE);
+        let size = max(&side.x).max(least).max(f64::MIN_POSITIVE);
         let change = if finite { max(dx) / size } else { f64::INFINITY };
         let met = verdict::worst(structure, targets, side) <= allowed;
         let (most, progress) = corrector.patience(met || self.spare.is_some());

@@ -13,16 +13,21 @@ const NAMED: usize = 8;
 
 /// The size of the shape, about: the largest target of its linear rows, as [`Problem`] has it for conflicts.
 pub(crate) fn scale(problem: &Problem, blocks: &[(Arc<Structure>, Block)]) -> f64 {
+    largest(problem, blocks).max(problem.least_scale())
+}
+
+/// The largest target of the linear rows.
+pub(crate) fn largest(problem: &Problem, blocks: &[(Arc<Structure>, Block)]) -> f64 {
     let linear = |c: usize| !matches!(problem.constraints()[c].demand, Demand::Curvature(_));
-    let mut scale = problem.least_scale();
+    let mut most = 0.0;
     for side in blocks.iter().flat_map(|b| &b.1.sides) {
         for (target, c) in side.targets.iter().zip(&side.constraints) {
-            if target.abs() > scale && linear(*c) {
-                scale = target.abs();
+            if target.abs() > most && linear(*c) {
+                most = target.abs();
             }
         }
     }
-    scale
+    most
 }
 
 /// What a row of length 1 may be missed by.
