@@ -1,6 +1,7 @@
 //! What a solver's factors are kept for: other targets of the same constraints, and the answer to one of them.
 
 use super::refine::{SolveError, Solver, Stage, fresh_sides};
+use crate::constraint::Demand;
 use crate::system::Problem;
 
 impl Solver {
@@ -53,7 +54,11 @@ impl Solver {
         coordinate: usize,
     ) -> Result<Option<Vec<(usize, Vec<f64>)>>, SolveError> {
         let Some(number) = self.problem.constraints().iter().position(|c| c.id == constraint) else { return Ok(None) };
-        let Some((b, s, r)) = self.row_of(number, coordinate).filter(|_| self.newton == 0) else { return Ok(None) };
+        // Where a curvature is asked for, shapes are not linear in the targets, even if no program was needed.
+        if self.problem.constraints().iter().any(|c| matches!(c.demand, Demand::Curvature(_))) {
+            return Ok(None);
+        }
+        let Some((b, s, r)) = self.row_of(number, coordinate) else { return Ok(None) };
         let kept = (self.at, self.stage, self.iterations, self.converged);
         let zero = {
             let structure = &self.blocks[b].0;
