@@ -153,3 +153,15 @@ fn height_fields_come_back() {
     }
     assert!(height::read_png(b"no picture").is_err());
 }
+
+#[test]
+fn a_grid_may_begin_with_a_gap() {
+    let header = "ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\nNODATA_value nan\n";
+    for gap in ["nan", "NaN", "NAN", "-nan"] {
+        let field = height::read_asc(&format!("{header}{gap} 1 2\n3 {gap} 5\n")).unwrap();
+        assert_eq!(field.known, [false, true, true, true, false, true], "{gap}");
+        assert_eq!(field.heights, [0.0, 1.0, 2.0, 3.0, 0.0, 5.0], "{gap}");
+    }
+    let infinite = height::read_asc(&format!("{header}inf 1 2 3 4 5")).unwrap_err();
+    assert!(infinite.contains("row 0, column 0"), "{infinite}");
+}
