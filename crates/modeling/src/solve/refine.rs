@@ -90,6 +90,8 @@ pub struct Solver {
     pub(super) notes: Vec<String>,
     /// Constraints with rows that were left out because they follow from others.
     pub(super) followers: Vec<usize>,
+    /// Constraints with rows that were left out though they are missed, which the notes say.
+    pub(super) left_out: Vec<usize>,
     /// Constraints that take part in rows that were left out.
     tied: BTreeSet<usize>,
     /// One a block, kept for other targets.
@@ -138,9 +140,11 @@ impl Solver {
         blocks.iter().try_for_each(|b| fits(&b.structure, method))?;
         let spare = if settings.method == Method::Auto { spare(&problem, method) } else { None };
         let notes = notes(&problem, &redundant);
-        // Those that are missed for good are in the notes.
-        let followers = redundant.iter().filter(|r| r.miss.is_none()).map(|r| r.constraint);
-        let followers: Vec<usize> = followers.collect::<BTreeSet<usize>>().into_iter().collect();
+        let sorted = |missed: bool| -> Vec<usize> {
+            let of = redundant.iter().filter(|r| r.miss.is_some() == missed).map(|r| r.constraint);
+            of.collect::<BTreeSet<usize>>().into_iter().collect()
+        };
+        let (followers, left_out) = (sorted(false), sorted(true));
         let tied = redundant.iter().flat_map(|r| r.others.iter().copied().chain([r.constraint])).collect();
         let sides = fresh_sides(&blocks);
         let blocks: Vec<(Arc<Structure>, Block)> =
@@ -156,6 +160,7 @@ impl Solver {
             blocks,
             notes,
             followers,
+            left_out,
             tied,
             at: (0, 0),
             sides,

@@ -58,10 +58,11 @@ impl Solver {
         if met && self.followers.is_empty() {
             return;
         }
-        // By name: rows that were left out are looked at as well.
+        // By name: rows that were left out because they follow from others are looked at as well.
         let coefficients = self.coefficients();
         let mut missed: Vec<(usize, f64)> = Vec::new();
-        for row in self.problem.rows().iter().filter(|r| r.give == 0.0) {
+        let noted = |c: usize| self.left_out.binary_search(&c).is_ok();
+        for row in self.problem.rows().iter().filter(|r| r.give == 0.0 && !noted(r.constraint)) {
             let value: f64 = row.entries().map(|(c, i, v)| v * coefficients[c][i]).sum();
             let miss = (value - row.target).abs();
             // What follows from others follows up to their rounding.

@@ -182,6 +182,27 @@ pub(crate) struct Redundant {
     pub(crate) miss: Option<f64>,
 }
 
+impl Redundant {
+    /// One a constraint, in order of the first row of each, with the worst miss of its coordinates.
+    fn by_constraint(rows: Vec<Redundant>) -> Vec<Redundant> {
+        let mut out: Vec<Redundant> = Vec::new();
+        for row in rows {
+            let Some(known) = out.iter_mut().find(|r| r.constraint == row.constraint) else {
+                out.push(row);
+                continue;
+            };
+            known.others.extend(row.others);
+            known.others.sort_unstable();
+            known.others.dedup();
+            known.miss = match (known.miss, row.miss) {
+                (Some(a), Some(b)) => Some(a.max(b)),
+                (a, b) => a.or(b),
+            };
+        }
+        out
+    }
+}
+
 impl Problem {
     /// All linear rows.
     pub(crate) fn rows(&self) -> Vec<Row> {
@@ -230,7 +251,7 @@ impl Problem {
                     blocks.iter_mut().find(|(first, b)| b.structure.k == 1 && same(first, &rows))
             {
                 let _ = first;
-                let kept: Vec<Row> = self.independent(&rows, scale, &mut Vec::new(), &coordinates)?;
+                let kept: Vec<Row> = self.independent(&rows, scale, &mut redundant, &coordinates)?;
                 block.sides.push(side(&kept, coordinates));
                 continue;
             }
@@ -240,7 +261,7 @@ impl Problem {
             let sides = vec![side(&kept, coordinates.clone())];
             blocks.push((rows, Block { structure, sides }));
         }
-        Ok((blocks.into_iter().map(|b| b.1).collect(), redundant))
+        Ok((blocks.into_iter().map(|b| b.1).collect(), Redundant::by_constraint(redundant)))
     }
 
     /// The size of the shape, about: the largest target of any coordinate (rows have length 1, so that all are in units
