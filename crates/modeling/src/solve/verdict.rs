@@ -2,11 +2,14 @@
 
 use super::refine::{SideState, Solver};
 use crate::constraint::{Demand, curvature};
-use crate::system::{Block, Problem, Structure};
+use crate::system::{Block, Problem, Structure, sight};
 use std::sync::Arc;
 
 /// A row of length 1 may be missed by this share of the size of the shape, whatever the tolerance.
 const MISSED: f64 = 1e-9;
+
+/// Forces whose sum is more than this share of their sizes are not in balance.
+const UNBALANCED: f64 = 1e-4;
 
 /// Missed constraints that are named.
 const NAMED: usize = 8;
@@ -55,6 +58,10 @@ impl Solver {
             block.sides.iter().zip(states).all(|(side, state)| worst(structure, &side.targets, state) <= allowed)
         };
         let met = self.blocks.iter().zip(&self.sides).all(within);
+        if self.converged && !self.is_balanced(scale) {
+            self.notes.push("constraints weigh too little beside the energy to hold the shape".to_owned());
+            self.converged = false;
+        }
         if met && self.followers.is_empty() {
             return;
         }
@@ -80,6 +87,43 @@ impl Solver {
         }
         self.converged = false;
         self.name(missed);
+    }
+
+    /// False where soft rows alone hold a shape, and their forces move one that costs no energy: rounding has lost
+    /// them beside the energy.
+    fn is_balanced(&self, scale: f64) -> bool {
+        let soft = |structure: &Structure| structure.rows() > 0 && structure.give.iter().all(|g| *g > 0.0);
+        if !self.blocks.iter().any(|b| soft(&b.0)) {
+            return true;
+        }
+        let null = self.h.null_space(self.problem.energy().free_degree());
+        for ((structure, block), states) in self.blocks.iter().zip(&self.sides).filter(|b| soft(&b.0.0)) {
+            for (side, state) in block.sides.iter().zip(states) {
+                let miss = |r: usize| side.targets[r] - structure.apply_row(r, &state.x);
+                let misses: Vec<f64> = (0..structure.rows()).map(miss).collect();
+                if misses.iter().all(|m| m.abs() <= MISSED * scale) {
+                    continue;
+                }
+                let (n, mut shape) = (structure.n, vec![0.0; structure.unknowns()]);
+                for c in 0..structure.k {
+                    for z in &null {
+                        shape[c * n..][..n].copy_from_slice(z);
+                        let most = z.iter().fold(0.0, |m: f64, z| m.max(z.abs()));
+                        let pull = |r: usize| {
+                            let seen = sight(structure.apply_row(r, &shape), structure.size(r, c) * most);
+                            misses[r] / structure.give[r] * seen
+                        };
+                        let (sum, size) =
+                            (0..structure.rows()).map(pull).fold((0.0, 0.0), |(s, a), p| (s + p, a + f64::abs(p)));
+                        if f64::abs(sum) > UNBALANCED * size {
+                            return false;
+                        }
+                    }
+                    shape[c * n..][..n].fill(0.0);
+                }
+            }
+        }
+        true
     }
 
     /// One note a missed constraint.
