@@ -241,3 +241,12 @@ fn who_stops_early_keeps_the_last_good_shape() {
         assert!(!found.converged() && points(&found) < 1e-7, "{more} more than {begun}: {:e}", points(&found));
     }
 }
+
+#[test]
+fn bends_that_contradict_each_other_are_not_told_to_take_a_weight() {
+    let rows = [at("a", 0.0, &[0.0, 0.0]), at("b", 0.5, &[1.0, 1.0]), at("c", 1.0, &[2.0, 0.0])];
+    let found = solve(32, Energy::BEND, 2, &[&rows[..], &[bent("k", 0.25, 3.0), bent("l", 0.25, 4.0)]].concat());
+    assert!(!found.converged());
+    let said = |word: &str| found.notes().iter().any(|n| n.contains(word));
+    assert!(said("constraint l contradicts k") && !said("weight"), "{:?}", found.notes());
+}

@@ -10,6 +10,7 @@
 use super::auto::fits;
 use super::refine::{SolveError, Solver, Stage, fresh_sides};
 use crate::constraint::{Demand, Row, curvature};
+use crate::system::ProblemError;
 use std::sync::Arc;
 
 /// The shape that the current program is linear around, and what is remembered of those before it.
@@ -156,6 +157,10 @@ impl Solver {
         let blocks = match self.problem.blocks(rows) {
             Ok((blocks, _)) => blocks,
             // What contradicts the rows here need not do so elsewhere, but there is no way to go on.
+            Err(ProblemError::Conflict { id, others, .. }) => {
+                self.notes.push(format!("constraint {id} contradicts {others}: remove one of them"));
+                return Ok(self.give_up(&curving.from));
+            }
             Err(e) => {
                 self.notes.push(e.to_string());
                 return Ok(self.give_up(&curving.from));
