@@ -250,3 +250,23 @@ fn bends_that_contradict_each_other_are_not_told_to_take_a_weight() {
     let said = |word: &str| found.notes().iter().any(|n| n.contains(word));
     assert!(said("constraint l contradicts k") && !said("weight"), "{:?}", found.notes());
 }
+
+#[test]
+fn straight_places_in_space_are_found() {
+    let points = [
+        at("a", 0.0, &[0.0, 0.0, 0.0]),
+        at("b", 0.3, &[1.0, 0.2, 0.3]),
+        at("c", 0.6, &[1.2, 1.0, 0.1]),
+        at("d", 1.0, &[0.0, 1.5, 1.0]),
+    ];
+    for place in [0.1, 0.3, 0.45, 0.6, 0.8] {
+        for (spans, energy) in [(32, Energy::BEND), (64, Energy::new(1.0, 1.0, 0.0).unwrap())] {
+            let straight = solve(spans, energy, 3, &[&points[..], &[bent("k", place, 0.0)]].concat());
+            assert!(straight.converged() && worst(&straight) < 1e-7, "{place}: {:?}", straight.notes());
+            // Hardly bent is hardly more.
+            let hardly = solve(spans, energy, 3, &[&points[..], &[bent("k", place, 1e-4)]].concat());
+            let less = hardly.energy() / straight.energy() - 1.0;
+            assert!(less.abs() < 1e-2, "{place}: {less}");
+        }
+    }
+}

@@ -206,7 +206,9 @@ impl Solver {
             for (side, state) in block.sides.iter().zip(states) {
                 for (r, c) in side.constraints.iter().enumerate().filter(|(r, _)| structure.give[*r] == 0.0) {
                     if let Ok(at) = numbers.binary_search(c) {
-                        forces[at] = state.multipliers[r] / structure.lengths[r];
+                        // Straight places in space have two rows.
+                        let force = state.multipliers[r] / structure.lengths[r];
+                        forces[at] = if forces[at] == 0.0 { force } else { f64::hypot(forces[at], force) };
                     }
                 }
             }
