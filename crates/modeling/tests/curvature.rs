@@ -270,3 +270,29 @@ fn straight_places_in_space_are_found() {
         }
     }
 }
+
+#[test]
+fn low_heights_bend_as_they_are_asked_to() {
+    let axis = |length: f64| Axis::new(Boundary::Open, 32, [0.0, length]).unwrap();
+    for (height, length, tolerance) in
+        [(1.0, 1.0, 1e-8), (1e-6, 1.0, 1e-4), (1e-6, 1.0, 1e-8), (1e-10, 1.0, 1e-8), (1e-6, 100.0, 1e-8)]
+    {
+        let want = -40.0 * height / length / length;
+        let rows = vec![
+            at("a", 0.0, &[0.0]),
+            at("b", 0.5 * length, &[height]),
+            at("c", length, &[0.0]),
+            bent("k", 0.5 * length, want),
+        ];
+        let problem = Problem::new(Space::curve(axis(length)), 1, Energy::BEND, None, rows).unwrap();
+        let settings = Settings { tolerance, ..Settings::default() };
+        let found = Solver::new(problem, settings).and_then(Solver::run).unwrap();
+        let miss = found.residuals().last().unwrap().miss;
+        assert!(found.converged(), "{height} over {length}: {:?}", found.notes());
+        assert!(miss.abs() <= 1e-3 * want.abs(), "{height} over {length}: {miss:e} of {want:e}");
+    }
+    // Nothing is asked of what is flat and shall be.
+    let flat = [at("a", 0.0, &[5.0]), at("b", 1.0, &[5.0]), bent("k", 0.5, 0.0)];
+    let found = solve(64, Energy::BEND, 1, &flat);
+    assert!(found.converged() && found.iterations() == 0, "{:?}", found.notes());
+}

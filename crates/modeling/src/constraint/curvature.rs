@@ -132,9 +132,9 @@ impl Seen {
         self.found.as_ref().map(|f| f.0 - self.want).filter(|m| m.is_finite())
     }
 
-    /// What a miss is judged by, for a shape of the given length.
-    pub(crate) fn unit(&self, length: f64) -> f64 {
-        self.want.abs().max(1.0 / length)
+    /// What a miss is judged by, for a shape of some [`usual`] curvature.
+    pub(crate) fn unit(&self, usual: f64) -> f64 {
+        self.want.abs().max(usual)
     }
 
     /// The hard row around this curve, and soft ones that hold the derivatives where `force` times the curvature bends
@@ -217,8 +217,9 @@ pub(crate) fn misses(problem: &Problem, coefficients: &[Vec<f64>]) -> Vec<Residu
     look(problem, coefficients).into_iter().map(of).collect()
 }
 
-/// The length of the polygon of the coefficients, about that of the curve; of a height, that of its graph.
-pub(crate) fn length(problem: &Problem, coefficients: &[Vec<f64>]) -> f64 {
+/// The curvature that the shape would have if it was bent evenly, about: one over the length of the polygon of its
+/// coefficients; of a height that of its graph, and less where the graph is flat.
+pub(crate) fn usual(problem: &Problem, coefficients: &[Vec<f64>]) -> f64 {
     let axis = &problem.space().axes()[0];
     let run = if coefficients.len() == 1 { 1.0 / axis.density() } else { 0.0 };
     let n = coefficients.first().map_or(0, Vec::len);
@@ -226,7 +227,10 @@ pub(crate) fn length(problem: &Problem, coefficients: &[Vec<f64>]) -> f64 {
         let square: f64 = coefficients.iter().map(|x| (x[i + 1] - x[i]).powi(2)).sum();
         (square + run * run).sqrt()
     };
-    (0..n.saturating_sub(1)).map(step).sum()
+    let even = 1.0 / (0..n.saturating_sub(1)).map(step).sum::<f64>();
+    let [height] = coefficients else { return even };
+    let side = axis.domain()[1] - axis.domain()[0];
+    even.min(height.iter().fold(0.0, |m: f64, v| m.max(v.abs())) / side / side)
 }
 
 #[cfg(test)]

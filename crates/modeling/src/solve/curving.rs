@@ -10,6 +10,7 @@
 use super::auto::fits;
 use super::refine::{SolveError, Solver, Stage, fresh_sides};
 use crate::constraint::{Demand, Row, curvature};
+use crate::energy::Hessian;
 use crate::system::ProblemError;
 use std::sync::Arc;
 
@@ -44,6 +45,9 @@ const FAR: f64 = 100.0;
 
 /// A longer step than this is worth a try.
 const LITTLE: f64 = 1.5;
+
+/// Soft rows of curvature that are less than this share of the energy's stiffness are left out.
+const FAINT: f64 = 1e-12;
 
 /// A miss costs this many times the force that holds it.
 const DEAR: f64 = 1.5;
@@ -151,9 +155,17 @@ impl Solver {
     fn program(&mut self, curving: Curving) -> Result<bool, SolveError> {
         let forces = self.forces();
         let mut rows = self.problem.rows();
+        let linear = rows.len();
         for (seen, force) in curvature::look(&self.problem, &curving.from).iter().zip(forces) {
             seen.rows(force, &mut rows);
         }
+        // What bends next to nothing only makes factors worse.
+        let most = self.h.trace() / self.problem.space().len() as f64 * FAINT;
+        let mut number = 0;
+        rows.retain(|r| {
+            number += 1;
+            number <= linear || r.give * most <= 1.0
+        });
         let blocks = match self.problem.blocks(rows) {
             Ok((blocks, _)) => blocks,
             // What contradicts the rows here need not do so elsewhere, but there is no way to go on.
@@ -222,10 +234,10 @@ impl Solver {
     }
 
     fn are_met(&self, misses: &[f64], shape: &[Vec<f64>]) -> bool {
-        let length = curvature::length(&self.problem, shape);
+        let usual = curvature::usual(&self.problem, shape);
         let seen = curvature::look(&self.problem, shape);
         let most = self.settings.tolerance.max(1e-12);
-        misses.iter().zip(seen).all(|(m, s)| m.abs() <= most * s.unit(length))
+        misses.iter().zip(seen).all(|(m, s)| m.abs() <= most * s.unit(usual))
     }
 
     /// Energy with that of the soft rows.

@@ -143,7 +143,7 @@ impl Solver {
         let coefficients = self.coefficients();
         let seen = curvature::look(&self.problem, &coefficients);
         let allowed = self.settings.tolerance.max(MISSED);
-        let length = curvature::length(&self.problem, &coefficients);
+        let usual = curvature::usual(&self.problem, &coefficients);
         let mut missed = Vec::new();
         for s in &seen {
             match s.miss() {
@@ -154,7 +154,7 @@ impl Solver {
                     ));
                     self.converged = false;
                 }
-                Some(miss) if miss.abs() <= allowed * s.unit(length) => {}
+                Some(miss) if miss.abs() <= allowed * s.unit(usual) => {}
                 Some(miss) => missed.push((s.constraint, miss.abs())),
             }
         }
