@@ -14,6 +14,7 @@ mod active;
 mod cover;
 mod hierarchy;
 mod least;
+mod offset;
 mod values;
 
 use super::method::Method;
@@ -71,6 +72,8 @@ pub struct Oracle {
     h: Arc<Operator>,
     notes: Vec<String>,
     active: Active,
+    /// What was taken off each coordinate's targets.
+    means: Vec<f64>,
     bound: f64,
     phase: Phase,
     /// Functions that were put to sleep: how often, and whether they sleep now.
@@ -135,6 +138,8 @@ const NEARBY: usize = 4;
 /// Control points a constraint from which on the oracle is faster than all wavelets, without open axes and with one:
 /// `cargo bench --bench oracle`.
 const PAYS: [f64; 2] = [3000.0, 100.0];
+/// Energies below this share of what rounding may make of them are zero.
+const NOTHING: f64 = 1e-8;
 /// Trials of dropping.
 const TRIALS: usize = 6;
 
@@ -156,7 +161,8 @@ impl Oracle {
         if problem.constraints().iter().any(|c| matches!(c.demand, Demand::Curvature(_))) {
             return Err(unfit("an adaptive set of wavelets takes no curvature constraints"));
         }
-        let (blocks, redundant) = problem.blocks(problem.rows())?;
+        let (mut blocks, redundant) = problem.blocks(problem.rows())?;
+        let means = offset::take_off(&mut blocks, problem.coordinates());
         let h = Arc::new(Operator::new(problem.space(), problem.energy(), None));
         let none = || unfit("the axes have no common pyramid");
         let hierarchy = Hierarchy::new(problem.space(), problem.energy(), &h).ok_or_else(none)?;
@@ -167,6 +173,7 @@ impl Oracle {
             h,
             notes,
             active,
+            means,
             bound,
             phase: Phase::Grow,
             asleep: BTreeMap::new(),
@@ -245,6 +252,12 @@ impl Oracle {
         (self.bound * self.last.energy).max(self.last.noise)
     }
 
+    /// The energy above the least that may be promised: rounding is an excuse only for energies that are nothing else.
+    fn promised(&self) -> f64 {
+        let nothing = self.last.energy <= NOTHING * self.last.noise;
+        if nothing { self.allowed() } else { self.bound * self.last.energy }
+    }
+
     /// True where more iterations would change next to nothing.
     fn is_settled(&self) -> bool {
         self.last.left <= SETTLED * self.allowed()
@@ -283,7 +296,9 @@ impl Oracle {
         let sum = sum(&gains);
         let mut gains = gains.functions;
         gains.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        self.excess = self.least.map_or(REACH * sum + self.last.left, |least| self.last.energy - least);
+        // Nothing is below zero, whatever rounding made of the least.
+        let above = |least: f64| if self.last.energy > 0.0 { self.last.energy - least } else { 0.0 };
+        self.excess = self.least.map_or(REACH * sum + self.last.left, above);
         if self.least.is_some() && self.excess > (GROWTH * allowed).max(REACH * sum) && self.share > CLOSEST {
             // Nobody would gain what is left: it is the iteration's.
             self.share *= 0.01;
@@ -311,7 +326,8 @@ impl Oracle {
             return Ok(());
         }
         let below = (BELOW * allowed).max(self.last.noise);
-        self.converged = (-below..=allowed).contains(&self.excess);
+        let promised = self.promised();
+        self.converged = (-below..=promised).contains(&self.excess);
         self.excess = self.excess.max(0.0);
         if !self.converged {
             self.notes.push("the active functions do not come as near to the least energy as was asked".to_owned());
@@ -321,7 +337,7 @@ impl Oracle {
         let mut order: Vec<(f64, Function)> =
             squares.iter().copied().zip(self.active.functions.iter().copied()).skip(corner).collect();
         order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        let budget = MARGIN * (allowed - self.excess).max(0.0);
+        let budget = MARGIN * (promised - self.excess).max(0.0);
         // Coefficients of functions of unit energy: the sum of their squares is about the energy that dropping costs.
         let count = |most: f64| {
             let mut sum = 0.0;
@@ -485,7 +501,10 @@ impl Oracle {
     /// The solution so far; its coefficients are those of the finest B-splines.
     pub fn solution(&self) -> Solution {
         let problem = &self.problem;
-        let coefficients = self.active.coefficients(problem.coordinates());
+        let mut coefficients = self.active.coefficients(problem.coordinates());
+        for (x, mean) in coefficients.iter_mut().zip(&self.means).filter(|e| *e.1 != 0.0) {
+            x.iter_mut().for_each(|x| *x += mean);
+        }
         let residuals = Residual::all(problem, &problem.rows(), &coefficients);
         let why = "asked for: an adaptive set of wavelets";
         Solution::new(
