@@ -194,3 +194,15 @@ fn nothing_is_dragged_past_a_curvature_that_came_back_or_needed_no_work() {
     let mut straight = handles(0.0);
     assert_eq!(straight.drag("b", &[Some(1.0), Some(2.0)]), Err(DragError::Fixed("b".to_owned())));
 }
+
+#[test]
+fn an_answer_that_did_not_converge_moves_nothing() {
+    let settings = Settings { method: Method::Bpx, most_iterations: 3, ..Settings::default() };
+    let mut solver = Solver::new(problem(Boundary::Open, 1), settings).unwrap();
+    solver.finish().unwrap();
+    let before = solver.solution();
+    let answer = solver.response("p3", 0);
+    assert!(matches!(&answer, Err(e) if e.to_string().contains("p3 did not converge")), "{answer:?}");
+    let after = solver.solution();
+    assert_eq!((before.notes(), before.coefficients()), (after.notes(), after.coefficients()));
+}

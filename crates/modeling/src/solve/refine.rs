@@ -38,6 +38,12 @@ pub enum SolveError {
     /// A tolerance that is none.
     #[error("tolerance {0}: give a number between 1e-15 and 1")]
     Tolerance(f64),
+    /// An answer to a target that is not good enough to move a shape by.
+    #[error("the answer to constraint {id} did not converge: try another solver, or a larger tolerance")]
+    Response {
+        /// Name of the constraint.
+        id: String,
+    },
     /// Rows that cannot be told apart numerically.
     #[error("constraint {id} cannot be told apart from those before it: move it, or give it a weight")]
     Degenerate {

@@ -47,7 +47,7 @@ impl Solver {
     /// coordinates, redundant rows, normals, images; and where a curvature is asked for.
     ///
     /// # Errors
-    /// [`SolveError::Degenerate`].
+    /// [`SolveError::Degenerate`]; [`SolveError::Response`] where the method does not reach its tolerance.
     pub fn response(
         &mut self,
         constraint: &str,
@@ -60,6 +60,8 @@ impl Solver {
         }
         let Some((b, s, r)) = self.row_of(number, coordinate) else { return Ok(None) };
         let kept = (self.at, self.stage, self.iterations, self.converged);
+        // A spare method, or the limit of iterations, leaves its marks on everything.
+        let (sides, said) = (self.sides.clone(), self.notes.len());
         let zero = {
             let structure = &self.blocks[b].0;
             let mut targets = vec![0.0; structure.rows()];
@@ -69,8 +71,9 @@ impl Solver {
         let side = &mut self.blocks[b].1.sides[s];
         let targets = std::mem::replace(&mut side.targets, zero);
         let fresh = fresh_sides(std::slice::from_ref(&self.blocks[b].1)).pop().and_then(|mut s| s.pop());
-        let state = std::mem::replace(&mut self.sides[b][s], fresh.unwrap_or_default());
+        self.sides[b][s] = fresh.unwrap_or_default();
         self.at = (b, s);
+        self.converged = true;
         self.stage = Stage::Residual;
         let mut outcome = Ok(());
         while self.at == (b, s) && self.stage != Stage::Finished {
@@ -84,10 +87,16 @@ impl Solver {
                 self.at = (b, s);
             }
         }
-        let column = std::mem::replace(&mut self.sides[b][s], state);
+        let column = std::mem::take(&mut self.sides[b][s]);
+        let good = self.converged;
+        self.sides = sides;
+        self.notes.truncate(said);
         self.blocks[b].1.sides[s].targets = targets;
         (self.at, self.stage, self.iterations, self.converged) = kept;
         outcome?;
+        if !good {
+            return Err(SolveError::Response { id: constraint.to_owned() });
+        }
         let n = self.problem.space().len();
         let of = |(i, c): (usize, &usize)| (*c, column.x[i * n..][..n].to_vec());
         Ok(Some(self.blocks[b].1.sides[s].coordinates.iter().enumerate().map(of).collect()))
