@@ -110,6 +110,20 @@ fn a_row_that_is_left_out_is_named_with_the_worst_of_its_coordinates() {
     }
 }
 
+#[test]
+fn long_domains_excuse_no_contradiction() {
+    for length in [1.0, 1e6, 1e9, 1e12, 1e15] {
+        let space = Space::curve(Axis::new(Boundary::Open, 16, [0.0, length]).unwrap());
+        let rows = |again: f64| {
+            let at = |id: usize, share: f64, to: f64| position(id, &[share * length], vec![to]);
+            vec![at(0, 0.0, 0.0), at(1, 0.5, 0.0), at(2, 0.5, again), at(3, 1.0, 1.0)]
+        };
+        let miss = conflict(solver(&space, 1, rows(1e-4)));
+        assert!(miss.is_some_and(|m| (m / 1e-4 - 1.0).abs() < 1e-9), "{length:e}: {miss:?}");
+        assert_eq!(conflict(solver(&space, 1, rows(1e-16))), None);
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig {
         rng_seed: proptest::test_runner::RngSeed::Fixed(7),

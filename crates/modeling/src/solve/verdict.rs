@@ -16,7 +16,7 @@ const NAMED: usize = 8;
 
 /// The size of the shape, about: the largest target of its linear rows, as [`Problem`] has it for conflicts.
 pub(crate) fn scale(problem: &Problem, blocks: &[(Arc<Structure>, Block)]) -> f64 {
-    largest(problem, blocks).max(problem.least_scale())
+    problem.size(largest(problem, blocks))
 }
 
 /// The largest target of the linear rows.

@@ -171,6 +171,9 @@ const ROUNDING: f64 = 1e-12;
 /// Shapes below this share of the longest side of their domain are zero for all that anyone can tell.
 const NOTHING: f64 = 1e-3;
 
+/// Targets are nothing but rounding up to this share of the size of a shape of nothing but zeros.
+const RUBBLE: f64 = 5e-13;
+
 /// Rows that take part with less than this are not named.
 const NAMED: f64 = 1e-7;
 
@@ -268,7 +271,12 @@ impl Problem {
     /// of coefficients). Heights of zero beside others come from sums that cancel. A shape of nothing but zeros has
     /// only its domain to go by.
     fn scale(&self, rows: &[Row]) -> f64 {
-        rows.iter().fold(self.least_scale(), |m: f64, r| m.max(r.target.abs()))
+        self.size(rows.iter().fold(0.0, |m: f64, r| m.max(r.target.abs())))
+    }
+
+    /// The size of a shape whose largest target is this: that of its domain where it is nothing but rounding.
+    pub(crate) fn size(&self, largest: f64) -> f64 {
+        if largest > RUBBLE * self.least_scale() { largest } else { self.least_scale() }
     }
 
     /// The size of a shape of nothing but zeros.
