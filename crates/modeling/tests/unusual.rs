@@ -83,3 +83,27 @@ fn a_coordinate_that_is_zero_is_as_good_as_any() {
         }
     }
 }
+
+#[test]
+fn weights_that_drown_the_energy_are_refused_by_a_factor_of_their_sum() {
+    let at = |id: &str, t: f64, y: f64, weight: f64| {
+        Constraint::new(id, &[t], Demand::Position(vec![Some(y)])).soft(weight)
+    };
+    let space = Space::curve(Axis::new(Boundary::Open, 16, [0.0, 1.0]).unwrap());
+    for power in (0..=100).step_by(4) {
+        let w = 10.0_f64.powi(power);
+        let rows = vec![at("a", 0.0, 0.0, w), at("b", 0.25, 0.7, w), at("c", 0.5, 1.0, w), at("d", 1.0, 0.0, w)];
+        let problem = Problem::new(space.clone(), 1, Energy::BEND, None, rows).unwrap();
+        let want = run(&problem, Method::Banded);
+        assert!(want.converged(), "1e{power}");
+        let settings = Settings { method: Method::Cholesky, ..Settings::default() };
+        match Solver::new(problem, settings).and_then(Solver::run) {
+            Ok(found) if found.converged() => {
+                let over = found.energy() / want.energy() - 1.0;
+                assert!(power <= 20 && over.abs() < 1e-9, "1e{power}: {over:e}");
+            }
+            Ok(_) => {}
+            Err(e) => assert!(power > 16 && e.to_string().contains("weights"), "1e{power}: {e}"),
+        }
+    }
+}

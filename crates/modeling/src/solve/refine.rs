@@ -380,7 +380,7 @@ impl Solver {
             }
             Method::Cholesky => {
                 let solver = SparseSolver::new(&self.h, structure, energy.free_degree());
-                return Ok(Box::new(solver.ok_or_else(|| unfit("the matrix has no factor"))?));
+                return Ok(Box::new(solver.ok_or_else(|| unfit("the matrix has no factor; do weights differ too much?"))?));
             }
             Method::Multigrid if structure.rows() <= auto::CYCLES || space.is_curve() => {
                 let green = CycleGreen::new(space, energy, map, &self.h);

@@ -28,6 +28,9 @@ pub(crate) struct SparseSolver {
 /// How much stiffer than H the hard rows are made.
 const RHO: f64 = 1e3;
 
+/// Rows stiffer than H by this leave nothing of it in the factor.
+const HEAVIEST: f64 = 1e15;
+
 /// A shape of no energy, what the rows make of it times the roots of their stiffness, and the square of that.
 struct Loose {
     shape: Vec<f64>,
@@ -94,7 +97,7 @@ fn holds(loose: &[Loose]) -> Vec<usize> {
 }
 
 impl SparseSolver {
-    /// `None` where the library finds no factor; polynomials of a degree below `free` cost nothing.
+    /// `None` where the library finds no factor, and where rows weigh so much that it would lose H; polynomials of a degree below `free` cost nothing.
     pub(crate) fn new(h: &Operator, structure: Arc<Structure>, free: usize) -> Option<SparseSolver> {
         let n = structure.n;
         let mut entries = Vec::new();
@@ -111,6 +114,9 @@ impl SparseSolver {
         }
         let rho = RHO * size;
         let stiffness: Vec<f64> = structure.give.iter().map(|g| if *g > 0.0 { 1.0 / g } else { rho }).collect();
+        if stiffness.iter().any(|s| *s > HEAVIEST * size) {
+            return None;
+        }
         for (r, by) in stiffness.iter().enumerate() {
             let (columns, values) = structure.row(r);
             for (c, v) in columns.iter().zip(values) {
