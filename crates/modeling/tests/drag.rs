@@ -180,7 +180,12 @@ fn nothing_is_dragged_past_a_curvature_that_came_back_or_needed_no_work() {
     let axis = Axis::new(Boundary::Open, 16, [0.0, 1.0]).unwrap();
     let handles = |k: f64| {
         let bent = Constraint::new("k", &[0.25], Demand::Curvature(k));
-        let rows = vec![at("a", 0.0, 0.0, 0.0), at("b", 0.5, 1.0, if k == 0.0 { 0.0 } else { 1.0 }), at("c", 1.0, 2.0, 0.0), bent];
+        let rows = vec![
+            at("a", 0.0, 0.0, 0.0),
+            at("b", 0.5, 1.0, if k == 0.0 { 0.0 } else { 1.0 }),
+            at("c", 1.0, 2.0, 0.0),
+            bent,
+        ];
         let problem = Problem::new(Space::curve(axis), 2, Energy::BEND, None, rows).unwrap();
         Handles::new(problem, Settings::default(), usize::MAX).unwrap()
     };

@@ -64,9 +64,7 @@ fn slopes_and_images_alone_are_enough_for_every_solver() {
 
 #[test]
 fn a_coordinate_that_is_zero_is_as_good_as_any() {
-    let at = |id: &str, t: f64, x: f64, y: f64| {
-        Constraint::new(id, &[t], Demand::Position(vec![Some(x), Some(y)]))
-    };
+    let at = |id: &str, t: f64, x: f64, y: f64| Constraint::new(id, &[t], Demand::Position(vec![Some(x), Some(y)]));
     // What is soft would pull y away from zero, but is at a point that is held there.
     let pulled = at("soft", 0.3, 1.0, 0.1).soft(1e6);
     let rows = vec![at("a", 0.0, 0.0, 0.0), at("b", 0.3, 1.0, 0.0), at("c", 1.0, 2.0, 0.0), pulled];
@@ -86,9 +84,8 @@ fn a_coordinate_that_is_zero_is_as_good_as_any() {
 
 #[test]
 fn weights_that_drown_the_energy_are_refused_by_a_factor_of_their_sum() {
-    let at = |id: &str, t: f64, y: f64, weight: f64| {
-        Constraint::new(id, &[t], Demand::Position(vec![Some(y)])).soft(weight)
-    };
+    let at =
+        |id: &str, t: f64, y: f64, weight: f64| Constraint::new(id, &[t], Demand::Position(vec![Some(y)])).soft(weight);
     let space = Space::curve(Axis::new(Boundary::Open, 16, [0.0, 1.0]).unwrap());
     for power in (0..=100).step_by(4) {
         let w = 10.0_f64.powi(power);

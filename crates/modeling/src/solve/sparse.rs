@@ -97,7 +97,8 @@ fn holds(loose: &[Loose]) -> Vec<usize> {
 }
 
 impl SparseSolver {
-    /// `None` where the library finds no factor, and where rows weigh so much that it would lose H; polynomials of a degree below `free` cost nothing.
+    /// `None` where the library finds no factor, and where rows weigh so much that it would lose H; polynomials of a
+    /// degree below `free` cost nothing.
     pub(crate) fn new(h: &Operator, structure: Arc<Structure>, free: usize) -> Option<SparseSolver> {
         let n = structure.n;
         let mut entries = Vec::new();

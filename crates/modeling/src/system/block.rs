@@ -44,8 +44,8 @@ pub(crate) struct Block {
 /// Sums that ought to cancel leave less than this share of what is summed.
 const CANCELLED: f64 = 1e-14;
 
-/// What a row sees of a shape of no energy, an entry of `A Z`: nothing where that is only the rounding of a sum of terms of
-/// this size. (Slopes and images do not see constants; solvers scale up what is small everywhere.)
+/// What a row sees of a shape of no energy, an entry of `A Z`: nothing where that is only the rounding of a sum of
+/// terms of this size. (Slopes and images do not see constants; solvers scale up what is small everywhere.)
 pub(crate) fn sight(value: f64, size: f64) -> f64 {
     if value.abs() <= CANCELLED * size { 0.0 } else { value }
 }
