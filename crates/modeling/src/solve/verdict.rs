@@ -97,29 +97,25 @@ impl Solver {
             return true;
         }
         let null = self.h.null_space(self.problem.energy().free_degree());
+        let rounding = allowed(self.settings.tolerance, scale);
         for ((structure, block), states) in self.blocks.iter().zip(&self.sides).filter(|b| soft(&b.0.0)) {
-            for (side, state) in block.sides.iter().zip(states) {
-                let miss = |r: usize| side.targets[r] - structure.apply_row(r, &state.x);
-                let misses: Vec<f64> = (0..structure.rows()).map(miss).collect();
-                if misses.iter().all(|m| m.abs() <= MISSED * scale) {
-                    continue;
-                }
-                let (n, mut shape) = (structure.n, vec![0.0; structure.unknowns()]);
-                for c in 0..structure.k {
-                    for z in &null {
-                        shape[c * n..][..n].copy_from_slice(z);
-                        let most = z.iter().fold(0.0, |m: f64, z| m.max(z.abs()));
-                        let pull = |r: usize| {
-                            let seen = sight(structure.apply_row(r, &shape), structure.size(r, c) * most);
-                            misses[r] / structure.give[r] * seen
-                        };
-                        let (sum, size) =
-                            (0..structure.rows()).map(pull).fold((0.0, 0.0), |(s, a), p| (s + p, a + f64::abs(p)));
-                        if f64::abs(sum) > UNBALANCED * size {
-                            return false;
-                        }
+            let n = structure.n;
+            for (c, z) in (0..structure.k).flat_map(|c| null.iter().map(move |z| (c, z))) {
+                let mut shape = vec![0.0; structure.unknowns()];
+                shape[c * n..][..n].copy_from_slice(z);
+                let most = z.iter().fold(0.0, |m: f64, z| m.max(z.abs()));
+                let sees = |r: usize| sight(structure.apply_row(r, &shape), structure.size(r, c) * most);
+                let seen: Vec<f64> = (0..structure.rows()).map(|r| sees(r) / structure.give[r]).collect();
+                for (side, state) in block.sides.iter().zip(states) {
+                    let (mut sum, mut least) = (0.0, 0.0);
+                    for (r, by) in seen.iter().enumerate() {
+                        let miss = side.targets[r] - structure.apply_row(r, &state.x);
+                        sum += miss * by;
+                        least += by.abs() * (UNBALANCED * miss.abs() + rounding);
                     }
-                    shape[c * n..][..n].fill(0.0);
+                    if f64::abs(sum) > least {
+                        return false;
+                    }
                 }
             }
         }
