@@ -248,7 +248,7 @@ impl Oracle {
 
     /// The energy above the least that may be promised: rounding is an excuse only for energies that are nothing else.
     fn promised(&self) -> f64 {
-        let nothing = self.last.energy <= NOTHING * self.last.noise;
+        let nothing = self.least.unwrap_or(self.last.energy) <= NOTHING * self.last.noise;
         if nothing { self.allowed() } else { self.bound * self.last.energy }
     }
 
