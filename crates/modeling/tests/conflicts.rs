@@ -78,6 +78,52 @@ fn what_no_shape_can_have_is_refused_and_not_ignored() {
     assert_eq!(image(0.0), None);
 }
 
+#[test]
+fn what_was_left_out_and_said_to_be_missed_is_judged_once() {
+    let space = Space::curve(Axis::new(Boundary::Open, 16, [0.0, 1.0]).unwrap());
+    let near = |extra: &[Constraint]| {
+        let rows = [position(0, &[0.0], vec![0.0]), position(1, &[0.5], vec![1.0])];
+        let rows = [&rows[..], &[position(2, &[0.5 + 5e-9], vec![1.0 + 4e-8]), position(3, &[1.0], vec![0.0])], extra];
+        solver(&space, 1, rows.concat()).and_then(Solver::run).unwrap()
+    };
+    let alone = near(&[]);
+    assert!(alone.converged() && alone.notes().len() == 1 && alone.notes()[0].contains("p2"), "{:?}", alone.notes());
+    // A point given twice elsewhere has nothing to do with it.
+    let beside = near(&[position(4, &[1.0], vec![0.0])]);
+    assert!(beside.converged(), "{:?}", beside.notes());
+    assert_eq!(beside.notes().iter().filter(|n| n.contains("p2")).count(), 1, "{:?}", beside.notes());
+}
+
+#[test]
+fn a_row_that_is_left_out_is_named_with_the_worst_of_its_coordinates() {
+    let space = Space::curve(Axis::new(Boundary::Open, 16, [0.0, 1.0]).unwrap());
+    for moved in [[4e-8, 0.0], [0.0, 4e-8]] {
+        let rows = vec![
+            position(0, &[0.0], vec![0.0, 0.0]),
+            position(1, &[0.5], vec![1.0, 1.0]),
+            position(2, &[0.5 + 5e-9], vec![1.0 + moved[0], 1.0 + moved[1]]),
+            position(3, &[1.0], vec![0.0, 0.0]),
+        ];
+        let found = solver(&space, 2, rows).and_then(Solver::run).unwrap();
+        let notes = found.notes();
+        assert!(notes.len() == 1 && notes[0].contains("p2") && notes[0].contains("missed by 4.0e-8"), "{notes:?}");
+    }
+}
+
+#[test]
+fn long_domains_excuse_no_contradiction() {
+    for length in [1.0, 1e6, 1e9, 1e12, 1e15] {
+        let space = Space::curve(Axis::new(Boundary::Open, 16, [0.0, length]).unwrap());
+        let rows = |again: f64| {
+            let at = |id: usize, share: f64, to: f64| position(id, &[share * length], vec![to]);
+            vec![at(0, 0.0, 0.0), at(1, 0.5, 0.0), at(2, 0.5, again), at(3, 1.0, 1.0)]
+        };
+        let miss = conflict(solver(&space, 1, rows(1e-4)));
+        assert!(miss.is_some_and(|m| (m / 1e-4 - 1.0).abs() < 1e-9), "{length:e}: {miss:?}");
+        assert_eq!(conflict(solver(&space, 1, rows(1e-16))), None);
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig {
         rng_seed: proptest::test_runner::RngSeed::Fixed(7),

@@ -202,3 +202,97 @@ fn a_row_that_is_missed_is_named_whatever_the_solver_says() {
         }
     }
 }
+
+#[test]
+fn who_stops_early_keeps_the_last_good_shape() {
+    // Two bends that contradict each other keep the solver busy.
+    let rows = [
+        at("a", 0.0, &[0.0, 0.0]),
+        at("b", 0.5, &[1.0, 1.0]),
+        at("c", 1.0, &[2.0, 0.0]),
+        bent("k", 0.25, 3.0),
+        bent("l", 0.2501, -4.0),
+    ];
+    let axis = Axis::new(Boundary::Open, 128, [0.0, 1.0]).unwrap();
+    let problem = || Problem::new(Space::curve(axis), 2, Energy::BEND, None, rows.to_vec()).unwrap();
+    let points = |found: &Solution| {
+        let ends = found.residuals().iter().filter(|r| ["a", "b", "c"].contains(&&r.id[..]));
+        ends.fold(0.0, |m: f64, r| m.max(r.miss.abs()))
+    };
+    let settings = Settings { method: Method::Wavelet, ..Settings::default() };
+    let mut solver = Solver::new(problem(), settings).unwrap();
+    let mut begun = None;
+    for _ in 0..2000 {
+        if solver.step().is_none() {
+            break;
+        }
+        let found = solver.solution();
+        if begun.is_none() && points(&found) < 1e-7 {
+            begun = Some(found.iterations());
+        }
+        let kept = points(&found) < 1e-7 && found.energy() > 1.0;
+        assert!(begun.is_none() || kept, "{:e} after {}", points(&found), found.iterations());
+    }
+    // So does the limit of iterations.
+    let begun = begun.unwrap();
+    for more in [0, 1, 20, 50, 100] {
+        let settings = Settings { most_iterations: begun + more, ..settings };
+        let found = Solver::new(problem(), settings).and_then(Solver::run).unwrap();
+        assert!(!found.converged() && points(&found) < 1e-7, "{more} more than {begun}: {:e}", points(&found));
+    }
+}
+
+#[test]
+fn bends_that_contradict_each_other_are_not_told_to_take_a_weight() {
+    let rows = [at("a", 0.0, &[0.0, 0.0]), at("b", 0.5, &[1.0, 1.0]), at("c", 1.0, &[2.0, 0.0])];
+    let found = solve(32, Energy::BEND, 2, &[&rows[..], &[bent("k", 0.25, 3.0), bent("l", 0.25, 4.0)]].concat());
+    assert!(!found.converged());
+    let said = |word: &str| found.notes().iter().any(|n| n.contains(word));
+    assert!(said("constraint l contradicts k") && !said("weight"), "{:?}", found.notes());
+}
+
+#[test]
+fn straight_places_in_space_are_found() {
+    let points = [
+        at("a", 0.0, &[0.0, 0.0, 0.0]),
+        at("b", 0.3, &[1.0, 0.2, 0.3]),
+        at("c", 0.6, &[1.2, 1.0, 0.1]),
+        at("d", 1.0, &[0.0, 1.5, 1.0]),
+    ];
+    for place in [0.1, 0.3, 0.45, 0.6, 0.8] {
+        for (spans, energy) in [(32, Energy::BEND), (64, Energy::new(1.0, 1.0, 0.0).unwrap())] {
+            let straight = solve(spans, energy, 3, &[&points[..], &[bent("k", place, 0.0)]].concat());
+            assert!(straight.converged() && worst(&straight) < 1e-7, "{place}: {:?}", straight.notes());
+            // Hardly bent is hardly more.
+            let hardly = solve(spans, energy, 3, &[&points[..], &[bent("k", place, 1e-4)]].concat());
+            let less = hardly.energy() / straight.energy() - 1.0;
+            assert!(less.abs() < 1e-2, "{place}: {less}");
+        }
+    }
+}
+
+#[test]
+fn low_heights_bend_as_they_are_asked_to() {
+    let axis = |length: f64| Axis::new(Boundary::Open, 32, [0.0, length]).unwrap();
+    for (height, length, tolerance) in
+        [(1.0, 1.0, 1e-8), (1e-6, 1.0, 1e-4), (1e-6, 1.0, 1e-8), (1e-10, 1.0, 1e-8), (1e-6, 100.0, 1e-8)]
+    {
+        let want = -40.0 * height / length / length;
+        let rows = vec![
+            at("a", 0.0, &[0.0]),
+            at("b", 0.5 * length, &[height]),
+            at("c", length, &[0.0]),
+            bent("k", 0.5 * length, want),
+        ];
+        let problem = Problem::new(Space::curve(axis(length)), 1, Energy::BEND, None, rows).unwrap();
+        let settings = Settings { tolerance, ..Settings::default() };
+        let found = Solver::new(problem, settings).and_then(Solver::run).unwrap();
+        let miss = found.residuals().last().unwrap().miss;
+        assert!(found.converged(), "{height} over {length}: {:?}", found.notes());
+        assert!(miss.abs() <= 1e-3 * want.abs(), "{height} over {length}: {miss:e} of {want:e}");
+    }
+    // Nothing is asked of what is flat and shall be.
+    let flat = [at("a", 0.0, &[5.0]), at("b", 1.0, &[5.0]), bent("k", 0.5, 0.0)];
+    let found = solve(64, Energy::BEND, 1, &flat);
+    assert!(found.converged() && found.iterations() == 0, "{:?}", found.notes());
+}

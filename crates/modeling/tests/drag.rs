@@ -173,3 +173,41 @@ fn undo_makes_the_factors_of_the_constraints_it_brings_back() {
         assert_solved(&handles, settings);
     }
 }
+
+#[test]
+fn nothing_is_dragged_past_a_curvature_that_came_back_or_needed_no_work() {
+    let at = |id: &str, t: f64, x: f64, y: f64| Constraint::new(id, &[t], Demand::Position(vec![Some(x), Some(y)]));
+    let axis = Axis::new(Boundary::Open, 16, [0.0, 1.0]).unwrap();
+    let handles = |k: f64| {
+        let bent = Constraint::new("k", &[0.25], Demand::Curvature(k));
+        let rows = vec![
+            at("a", 0.0, 0.0, 0.0),
+            at("b", 0.5, 1.0, if k == 0.0 { 0.0 } else { 1.0 }),
+            at("c", 1.0, 2.0, 0.0),
+            bent,
+        ];
+        let problem = Problem::new(Space::curve(axis), 2, Energy::BEND, None, rows).unwrap();
+        Handles::new(problem, Settings::default(), usize::MAX).unwrap()
+    };
+    let mut bent = handles(-2.0);
+    bent.save();
+    bent.remove("k").unwrap();
+    bent.drag("b", &[Some(1.0), Some(0.5)]).unwrap();
+    assert!(bent.undo().unwrap());
+    assert_eq!(bent.drag("b", &[Some(1.0), Some(2.0)]), Err(DragError::Fixed("b".to_owned())));
+    // A straight line has no curvature from the start.
+    let mut straight = handles(0.0);
+    assert_eq!(straight.drag("b", &[Some(1.0), Some(2.0)]), Err(DragError::Fixed("b".to_owned())));
+}
+
+#[test]
+fn an_answer_that_did_not_converge_moves_nothing() {
+    let settings = Settings { method: Method::Bpx, most_iterations: 3, ..Settings::default() };
+    let mut solver = Solver::new(problem(Boundary::Open, 1), settings).unwrap();
+    solver.finish().unwrap();
+    let before = solver.solution();
+    let answer = solver.response("p3", 0);
+    assert!(matches!(&answer, Err(e) if e.to_string().contains("p3 did not converge")), "{answer:?}");
+    let after = solver.solution();
+    assert_eq!((before.notes(), before.coefficients()), (after.notes(), after.coefficients()));
+}

@@ -145,3 +145,15 @@ fn a_fair_curve_reaches_tolerances_far_below_the_noise_and_says_which_it_cannot(
     let refused = fair(&points, 1e-18).unwrap_err();
     assert!(matches!(refused, FairError::Unreachable { .. }), "{refused}");
 }
+
+#[test]
+fn numbers_out_of_all_proportion_are_named_for_what_they_are() {
+    let (places, heights) = wave(200, [1.0, 1.0]);
+    let data = Scatter::new(places.clone(), heights.clone()).unwrap();
+    let with = |weight: f64| FitSettings { weight: Some(weight), stiffening: Some(0.0), ..FitSettings::default() };
+    let lost = surface(&data, FitSettings { spans: Some(64), ..with(1e-300) });
+    assert!(matches!(lost, Err(FitError::Lost { .. })), "{lost:?}");
+    let far = places.iter().map(|p| [1e200 * p[0], p[1]]).collect();
+    let far = surface(&Scatter::new(far, heights).unwrap(), FitSettings::default());
+    assert!(matches!(far, Err(FitError::Large(v)) if v > 1e100), "{far:?}");
+}

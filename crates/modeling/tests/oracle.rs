@@ -171,3 +171,42 @@ fn long_cells_keep_the_promise_too() {
         assert!(!Oracle::pays(&problem));
     }
 }
+
+#[test]
+fn heights_far_from_zero_are_as_near_the_least_energy() {
+    let axis = |boundary| Axis::new(boundary, 64, [0.0, 1.0]).unwrap();
+    let unit = |k: u64, i: u64| ondelette_numerics::seed::unit(ondelette_numerics::seed::combine(k, i));
+    for boundary in [Boundary::Open, Boundary::Mirrored] {
+        for (offset, tilt) in [(0.0, 0.0), (10.0, 0.0), (1e3, 0.0), (1e6, 0.0), (-1e6, 0.0), (0.0, 1e4), (1e6, 1e4)] {
+            let point = |i: u64| {
+                let at = [unit(1, i), unit(2, i)];
+                let height = offset + tilt * at[0] + unit(3, i);
+                Constraint::new(format!("{i}"), &at, Demand::Position(vec![Some(height)]))
+            };
+            let energy = Energy::new(if tilt == 0.0 { 0.1 } else { 0.0 }, 1.0, 0.0).unwrap();
+            let space = Space::surface(axis(boundary), axis(boundary));
+            let problem = Problem::new(space, 1, energy, None, (0..12).map(point).collect()).unwrap();
+            let settings = Settings { tolerance: 1e-10, ..Settings::default() };
+            let full = Solver::new(problem.clone(), settings).and_then(Solver::run).unwrap();
+            let few = Oracle::new(problem, 1e-3).and_then(Oracle::run).unwrap();
+            let over = few.energy() / full.energy() - 1.0;
+            assert!(few.converged() || tilt > 0.0, "{boundary:?} {offset} {tilt}: {:?}", few.notes());
+            assert!(!few.converged() || over.abs() < 1.1e-3, "{boundary:?} {offset} {tilt}: {over:e}");
+            let size = offset.abs() + tilt + 1.0;
+            assert!(few.residuals().iter().all(|r| r.miss.abs() < 1e-11 * size), "{boundary:?} {offset} {tilt}");
+        }
+    }
+    // Planes cost nothing: where nothing is left to be gained they are done.
+    for number in 0..20 {
+        let [a, b, c] = [1, 2, 3].map(|k| 10.0 * unit(k, 100 + number) - 5.0);
+        let point = |i: u64| {
+            let at = [unit(4 + number, 2 * i), unit(4 + number, 2 * i + 1)];
+            let height = 1e3 * a + b * at[0] + c * at[1];
+            Constraint::new(format!("{i}"), &at, Demand::Position(vec![Some(height)]))
+        };
+        let space = Space::surface(axis(Boundary::Open), axis(Boundary::Open));
+        let problem = Problem::new(space, 1, Energy::BEND, None, (0..8).map(point).collect()).unwrap();
+        let few = Oracle::new(problem, 1e-3).and_then(Oracle::run).unwrap();
+        assert!(few.converged() && few.energy() < 1e-10, "{number}: {:e} {:?}", few.energy(), few.notes());
+    }
+}

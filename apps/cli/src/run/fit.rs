@@ -46,7 +46,11 @@ pub(crate) fn run(plan: &FitPlan) -> Result<Outcome, Refusal> {
     if converged {
         return Ok(Outcome::Done);
     }
-    tell("not converged: give fewer spans, a larger weight, or a stiffening above 0");
+    tell(match (plan.fair, plan.weight) {
+        (true, _) => "not converged: give a larger tolerance",
+        (_, Some(weight)) if weight > 1.0 => "not converged: give a smaller weight",
+        _ => "not converged: give fewer spans, a larger weight, or a stiffening above 0",
+    });
     Ok(Outcome::Unfinished)
 }
 
@@ -134,6 +138,7 @@ fn smooth(plan: &FitPlan, points: &Points) -> Result<Fitted, String> {
         "points": list.len(),
         "closed": closed,
         "spans": fit.curve.axis().spans(),
+        "converged": fit.converged,
         "rms": fit.rms,
         "weight": fit.weight,
         "stiffening": fit.stiffening,
@@ -167,6 +172,7 @@ fn outline(plan: &FitPlan, points: &Points) -> Result<Fitted, String> {
     let report = json!({
         "points": list.len(),
         "control_points": curve.points().len(),
+        "converged": fair.curve.converged(),
         "largest_move": fair.largest_move,
         "tolerance": tolerance,
     });

@@ -143,3 +143,15 @@ fn a_fit_states_the_energy_that_it_minimised_and_whether_it_converged() {
     place.write("tall.csv", "0,0,1e200\n1,0,0\n0,1,0\n1,1,1\n");
     assert!(place.run("fit tall.csv -o x.json").with_code(2).err.contains("too large"));
 }
+
+#[test]
+fn an_outline_that_no_solver_can_hold_is_said_not_to_be_one() {
+    let place = Place::new();
+    place.write("square.csv", "0,0\n1,0\n1,1\n0,1\n0,0\n");
+    place.run("fit square.csv --weight 1e-3 -o out.json --report r.json").with_code(0);
+    assert_eq!(json(&place, "r.json")["converged"], true);
+    // Points weigh nothing beside this energy: what comes out is not the least of its sum.
+    let ended = place.run("fit square.csv --weight 1e300 -o out.json --report r.json").with_code(1);
+    assert!(ended.err.contains("smaller weight"), "{}", ended.err);
+    assert_eq!(json(&place, "r.json")["converged"], false);
+}

@@ -97,7 +97,9 @@ pub fn read_asc(text: &str) -> Result<HeightField, String> {
     let mut words = text.split_whitespace().peekable();
     let (mut rows, mut columns, mut cell, mut gap) = (None, None, [1.0; 2], -9999.0);
     let (mut corner, mut centred) = ([0.0; 2], [false; 2]);
-    while let Some(name) = words.next_if(|w| w.starts_with(|c: char| c.is_ascii_alphabetic())) {
+    // A first height that is no number begins with a letter, too.
+    let is_name = |w: &&str| w.starts_with(|c: char| c.is_ascii_alphabetic()) && w.parse::<f64>().is_err();
+    while let Some(name) = words.next_if(is_name) {
         let value = words.next().unwrap_or_default();
         let number = || value.parse::<f64>().map_err(|_| format!("{name} {value:?} is no number"));
         let count = || value.parse::<usize>().map_err(|_| format!("{name} {value:?} is no count"));

@@ -25,6 +25,9 @@ pub const MOST: f64 = 1e9;
 /// An affine map, `[a b c d e f]` as in SVG.
 type Matrix = [f64; 6];
 
+/// From y down to y up and back.
+const MIRROR: Matrix = [1.0, 0.0, 0.0, -1.0, 0.0, 0.0];
+
 fn product(m: &Matrix, n: &Matrix) -> Matrix {
     [
         m[0] * n[0] + m[2] * n[1],
@@ -60,10 +63,16 @@ pub fn read(text: &str) -> Result<SvgPaths, String> {
             continue;
         }
         let mut map = outer;
-        if node.attribute("data-ondelette-y") == Some("up") {
-            out.y_down = false;
-        } else if let Some(text) = node.attribute("transform") {
+        let up = node.attribute("data-ondelette-y") == Some("up");
+        if let Some(text) = node.attribute("transform") {
             map = product(&outer, &path::transform(text)?);
+        } else if up {
+            map = product(&outer, &MIRROR);
+        }
+        if up {
+            // Where others moved the group, or a group around it, the picture is what they moved.
+            out.y_down = false;
+            map = product(&MIRROR, &map);
         }
         let line = || document.text_pos_at(node.range().start).row;
         let data = match name {

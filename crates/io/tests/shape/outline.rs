@@ -153,3 +153,35 @@ fn height_fields_come_back() {
     }
     assert!(height::read_png(b"no picture").is_err());
 }
+
+#[test]
+fn a_grid_may_begin_with_a_gap() {
+    let header = "ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\nNODATA_value nan\n";
+    for gap in ["nan", "NaN", "NAN", "-nan"] {
+        let field = height::read_asc(&format!("{header}{gap} 1 2\n3 {gap} 5\n")).unwrap();
+        assert_eq!(field.known, [false, true, true, true, false, true], "{gap}");
+        assert_eq!(field.heights, [0.0, 1.0, 2.0, 3.0, 0.0, 5.0], "{gap}");
+    }
+    let infinite = height::read_asc(&format!("{header}inf 1 2 3 4 5")).unwrap_err();
+    assert!(infinite.contains("row 0, column 0"), "{infinite}");
+}
+
+#[test]
+fn a_curve_whose_y_points_up_may_be_moved_in_the_picture() {
+    let svg = |around: &str, transform: &str| {
+        let text = format!(
+            "<svg xmlns='http://www.w3.org/2000/svg'><g {around}><g data-ondelette-y='up' {transform}>\
+             <path d='M0 0C0 1 1 1 1 0'/></g></g></svg>"
+        );
+        let read = svg::read(&text).unwrap();
+        assert!(!read.y_down);
+        read.path.parts[0].points().iter().map(|p| [p[0], p[1]]).collect::<Vec<[f64; 2]>>()
+    };
+    let as_written = svg("", "transform='scale(1,-1)'");
+    assert_eq!(as_written, [[0.0, 0.0], [0.0, 1.0], [1.0, 1.0], [1.0, 0.0]]);
+    assert_eq!(svg("", ""), as_written);
+    // An editor moves the picture 100 right and 200 down.
+    let moved = [[100.0, -200.0], [100.0, -199.0], [101.0, -199.0], [101.0, -200.0]];
+    assert_eq!(svg("", "transform='matrix(1,0,0,-1,100,200)'"), moved);
+    assert_eq!(svg("transform='translate(100,200)'", "transform='scale(1,-1)'"), moved);
+}

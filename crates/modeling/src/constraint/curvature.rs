@@ -31,32 +31,51 @@ pub(crate) fn curvature(d1: &[f64], d2: &[f64]) -> Option<(f64, Vec<f64>, Vec<f6
     if s <= 1e-150 || !s.is_finite() {
         return None;
     }
-    let cube = s * square;
-    let (size, by1, by2) = match (d1, d2) {
-        ([x1, y1], [x2, y2]) => (x1 * y2 - y1 * x2, vec![*y2, -x2], vec![-y1, *x1]),
-        _ => {
-            let cross = |a: &[f64], b: &[f64]| {
-                vec![a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-            };
-            let v = cross(d1, d2);
-            let size = v.iter().map(|v| v * v).sum::<f64>().sqrt();
-            // On a straight place any direction across will do.
-            let u: Vec<f64> = if size > 1e-12 * square {
-                v.iter().map(|v| v / size).collect()
-            } else {
-                let least = (0..3).min_by(|a, b| d1[*a].abs().total_cmp(&d1[*b].abs())).unwrap_or(0);
-                let mut e = [0.0; 3];
-                e[least] = 1.0;
-                let w = cross(d1, &e);
-                let length = w.iter().map(|v| v * v).sum::<f64>().sqrt();
-                w.iter().map(|v| v / length).collect()
-            };
-            (size, cross(d2, &u), cross(&u, d1))
-        }
-    };
+    if let ([x1, y1], [x2, y2]) = (d1, d2) {
+        let (by1, by2) = (vec![*y2, -x2], vec![-y1, *x1]);
+        return Some(scaled(d1, x1 * y2 - y1 * x2, by1, by2));
+    }
+    let v = cross(d1, d2);
+    let size = v.iter().map(|v| v * v).sum::<f64>().sqrt();
+    // On a straight place any direction across will do.
+    let u = if size > 1e-12 * square { v.iter().map(|v| v / size).collect() } else { across(d1) };
+    Some(scaled(d1, size, cross(d2, &u), cross(&u, d1)))
+}
+
+/// The size of the cross product, or a part of it, and its slopes by both derivatives, as curvature.
+fn scaled(d1: &[f64], size: f64, by1: Vec<f64>, by2: Vec<f64>) -> (f64, Vec<f64>, Vec<f64>) {
+    let square: f64 = d1.iter().map(|v| v * v).sum();
+    let cube = square.sqrt() * square;
     let k = size / cube;
     let first = by1.iter().zip(d1).map(|(b, d)| b / cube - 3.0 * k / square * d).collect();
-    Some((k, first, by2.iter().map(|b| b / cube).collect()))
+    (k, first, by2.iter().map(|b| b / cube).collect())
+}
+
+fn cross(a: &[f64], b: &[f64]) -> Vec<f64> {
+    vec![a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+/// A direction across a tangent in space.
+fn across(d1: &[f64]) -> Vec<f64> {
+    let least = (0..3).min_by(|a, b| d1[*a].abs().total_cmp(&d1[*b].abs())).unwrap_or(0);
+    let mut e = [0.0; 3];
+    e[least] = 1.0;
+    let w = cross(d1, &e);
+    let length = w.iter().map(|v| v * v).sum::<f64>().sqrt();
+    w.iter().map(|v| v / length).collect()
+}
+
+/// Both parts of the curvature vector in space, along two directions across the tangent: they vanish with it, and are
+/// smooth there, where its size has a kink.
+fn parts(d1: &[f64], d2: &[f64]) -> [(f64, Vec<f64>, Vec<f64>); 2] {
+    let u = across(d1);
+    let w = cross(d1, &u);
+    let length = w.iter().map(|v| v * v).sum::<f64>().sqrt();
+    let v = cross(d1, d2);
+    [u, w.iter().map(|w| w / length).collect()].map(|u: Vec<f64>| {
+        let size = v.iter().zip(&u).map(|(v, u)| v * u).sum();
+        scaled(d1, size, cross(d2, &u), cross(&u, d1))
+    })
 }
 
 /// The matrix of second derivatives of curvature by first and second derivative, row by row.
@@ -113,9 +132,9 @@ impl Seen {
         self.found.as_ref().map(|f| f.0 - self.want).filter(|m| m.is_finite())
     }
 
-    /// What a miss is judged by, for a shape of the given length.
-    pub(crate) fn unit(&self, length: f64) -> f64 {
-        self.want.abs().max(1.0 / length)
+    /// What a miss is judged by, for a shape of some [`usual`] curvature.
+    pub(crate) fn unit(&self, usual: f64) -> f64 {
+        self.want.abs().max(usual)
     }
 
     /// The hard row around this curve, and soft ones that hold the derivatives where `force` times the curvature bends
@@ -131,6 +150,12 @@ impl Seen {
         let value = |first: &[f64], second: &[f64]| -> f64 {
             (0..n).map(|i| first[i] * self.d1[i] + second[i] * self.d2[i]).sum()
         };
+        if n == 3 && self.want == 0.0 {
+            for (k, by1, by2) in parts(&self.d1, &self.d2) {
+                out.extend(Row::new(self.constraint, terms(&by1, &by2), value(&by1, &by2) - k, None));
+            }
+            return;
+        }
         out.extend(Row::new(self.constraint, terms(by1, by2), self.want - k + value(by1, by2), None));
         if force == 0.0 {
             return;
@@ -192,8 +217,9 @@ pub(crate) fn misses(problem: &Problem, coefficients: &[Vec<f64>]) -> Vec<Residu
     look(problem, coefficients).into_iter().map(of).collect()
 }
 
-/// The length of the polygon of the coefficients, about that of the curve; of a height, that of its graph.
-pub(crate) fn length(problem: &Problem, coefficients: &[Vec<f64>]) -> f64 {
+/// The curvature that the shape would have if it was bent evenly, about: one over the length of the polygon of its
+/// coefficients; of a height that of its graph, and less where the graph is flat.
+pub(crate) fn usual(problem: &Problem, coefficients: &[Vec<f64>]) -> f64 {
     let axis = &problem.space().axes()[0];
     let run = if coefficients.len() == 1 { 1.0 / axis.density() } else { 0.0 };
     let n = coefficients.first().map_or(0, Vec::len);
@@ -201,7 +227,10 @@ pub(crate) fn length(problem: &Problem, coefficients: &[Vec<f64>]) -> f64 {
         let square: f64 = coefficients.iter().map(|x| (x[i + 1] - x[i]).powi(2)).sum();
         (square + run * run).sqrt()
     };
-    (0..n.saturating_sub(1)).map(step).sum()
+    let even = 1.0 / (0..n.saturating_sub(1)).map(step).sum::<f64>();
+    let [height] = coefficients else { return even };
+    let side = axis.domain()[1] - axis.domain()[0];
+    even.min(height.iter().fold(0.0, |m: f64, v| m.max(v.abs())) / side / side)
 }
 
 #[cfg(test)]

@@ -30,6 +30,8 @@ pub struct CurveFit {
     pub rms: f64,
     /// Root mean square of predictions of left-out points, if any were left out.
     pub validation: Option<f64>,
+    /// False where the solver did not reach its tolerance.
+    pub converged: bool,
 }
 
 /// Points left out in turns: one in so many.
@@ -130,8 +132,9 @@ pub fn curve(points: &[Vec<f64>], closed: bool, settings: FitSettings) -> Result
     let (weight, stiffening) = (weight.unwrap_or(1e-9 * m as f64), stiffening.unwrap_or(0.0));
     let solution = data.solve(weight, stiffening, &|_| true)?;
     let rms = ((0..m).map(|i| data.distance(&solution, i)).sum::<f64>() / m as f64).sqrt();
+    let converged = solution.converged();
     let x = solution.coefficients();
     let control = (0..data.axis.len()).map(|i| std::array::from_fn(|c| x.get(c).map_or(0.0, |x| x[i])));
     let curve = Curve::new(data.axis, k, control.collect()).map_err(|_| wrong)?;
-    Ok(CurveFit { curve, parameters: data.parameters, weight, stiffening, rms, validation })
+    Ok(CurveFit { curve, parameters: data.parameters, weight, stiffening, rms, validation, converged })
 }

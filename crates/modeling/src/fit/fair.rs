@@ -15,7 +15,7 @@ use ondelette_wavelet::Boundary;
 /// A fair curve and the points on it.
 #[derive(Clone, Debug)]
 pub struct Fair {
-    /// The curve: open, over [0, 1] by chord length.
+    /// The curve: open, over [0, 1] by chord length; it says whether the solver converged.
     pub curve: Solution,
     /// Parameter of each point.
     pub parameters: Vec<f64>,

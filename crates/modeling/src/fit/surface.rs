@@ -87,6 +87,14 @@ pub enum FitError {
     /// The inner solver failed.
     #[error(transparent)]
     Solve(#[from] crate::solve::SolveError),
+    /// Numbers that leave no factor.
+    #[error("weight {weight:e}, stiffening {stiffening:e}: beside the data these numbers are too small or too large")]
+    Lost {
+        /// The weight of the energy.
+        weight: f64,
+        /// Square root of stretch over bend.
+        stiffening: f64,
+    },
     /// Spans that cannot be solved on.
     #[error("{0} spans: give a power of two from 4 to 1024")]
     Spans(usize),
@@ -147,7 +155,8 @@ pub fn surface(data: &Scatter, settings: FitSettings) -> Result<Fit, FitError> {
         };
         [range(0), range(1)]
     });
-    if let Some(value) = data.values.iter().find(|v| v.abs() > LARGEST) {
+    let coordinates = data.points.iter().chain(&domain).flatten();
+    if let Some(value) = data.values.iter().chain(coordinates).find(|v| v.abs() > LARGEST) {
         return Err(FitError::Large(*value));
     }
     let spans = match settings.spans {
@@ -208,6 +217,8 @@ pub fn surface(data: &Scatter, settings: FitSettings) -> Result<Fit, FitError> {
 
 /// Most iterations of the final solution. Ten to fifty are usual; weights that hardly smooth take more.
 const MOST: usize = 2000;
+/// An energy whose largest entry is this share of the data's is lost in their rounding.
+const DROWNED: f64 = 1e-18;
 /// Values above this have squares whose sums may be no numbers.
 pub(super) const LARGEST: f64 = 1e100;
 
@@ -335,8 +346,13 @@ impl Part {
         let ratio = stiffening / self.side;
         let energy = Energy::new(weight * ratio * ratio, weight, 0.0)?;
         let h = Operator::new(&self.spaces[0], &energy, None);
+        let largest = |diagonal: &mut dyn Iterator<Item = f64>| diagonal.fold(0.0, f64::max);
+        let (own, data) = (largest(&mut h.diagonal().into_iter()), largest(&mut fold.normals[0].diagonal()));
+        if !(own > DROWNED * data && own.is_finite()) {
+            return Err(FitError::Lost { weight, stiffening });
+        }
         let Some(mut cycle) = Cycle::with_data(&self.spaces[0], &energy, &h, &fold.normals) else {
-            return Err(FitError::Spans(self.spaces[0].axes()[0].spans()));
+            return Err(FitError::Lost { weight, stiffening });
         };
         Ok(cycle.conjugate_gradients(&fold.right, &mut fold.x, tolerance, most))
     }

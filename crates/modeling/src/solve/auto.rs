@@ -2,7 +2,7 @@
 
 use super::bpx;
 use super::method::Method;
-use super::refine::SolveError;
+use super::refine::{SolveError, Solver, Stage};
 use crate::energy::Operator;
 use crate::system::{MEMORY, Problem, ProblemError, Structure};
 use ondelette_wavelet::Boundary;
@@ -109,6 +109,27 @@ pub(crate) fn spare(problem: &Problem, chosen: Method) -> Option<(Method, &'stat
     }
 }
 
+impl Solver {
+    /// Starts anew with the spare method, if there is one that fits into memory.
+    pub(super) fn give_way(&mut self) -> bool {
+        let Some((method, why)) = self.spare.take() else { return false };
+        if let Err(e) = self.blocks.iter().try_for_each(|b| fits(&b.0, method)) {
+            self.notes.push(format!("constraints crowded for solver {}, and {method} does not fit: {e}", self.method));
+            return false;
+        }
+        (self.method, self.why) = (method, why);
+        for side in self.sides.iter_mut().flatten() {
+            side.x.fill(0.0);
+            side.multipliers.fill(0.0);
+            (side.corrections, side.change, side.miss) = (0, f64::INFINITY, f64::INFINITY);
+        }
+        self.correctors.iter_mut().for_each(|c| *c = None);
+        self.at = (0, 0);
+        self.stage = Stage::Residual;
+        true
+    }
+}
+
 /// For surfaces on open axes or of varying stiffness; measured by `cargo bench --bench auto`.
 fn sparse_or_levels(problem: &Problem, h: &Operator) -> Result<(Method, &'static str), SolveError> {
     let n = problem.space().len();
@@ -127,4 +148,36 @@ fn sparse_or_levels(problem: &Problem, h: &Operator) -> Result<(Method, &'static
         return Ok((Method::Cholesky, "varying stiffness on few spans"));
     }
     Ok((Method::Bpx, "open axes or varying stiffness"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::axis::Axis;
+    use crate::constraint::{Constraint, Demand};
+    use crate::energy::Energy;
+    use crate::solve::Settings;
+    use crate::system::Space;
+
+    fn solver(spans: usize, points: usize) -> Solver {
+        let axis = Axis::new(Boundary::Open, spans, [0.0, 1.0]).unwrap();
+        let at = |i: usize| {
+            let t = 0.3 + 4.0 * i as f64 / spans as f64;
+            Constraint::new(format!("{i}"), &[t], Demand::Position(vec![Some((i % 7) as f64)]))
+        };
+        let problem = Problem::new(Space::curve(axis), 1, Energy::BEND, None, (0..points).map(at).collect()).unwrap();
+        Solver::new(problem, Settings::default()).unwrap()
+    }
+
+    #[test]
+    fn a_method_whose_matrix_is_too_large_is_no_way_out() {
+        // 12.6 GB of a band's sides for crowded points of a long curve.
+        let mut long = solver(1 << 20, 1500);
+        assert_eq!(long.method(), Method::Cholesky);
+        assert!(!long.give_way() && long.method() == Method::Cholesky);
+        assert!(long.notes.iter().any(|n| n.contains("banded does not fit")), "{:?}", long.notes);
+        // A shorter one may.
+        let mut short = solver(1 << 12, 150);
+        assert!(short.give_way() && short.method() == Method::Banded && short.notes.is_empty());
+    }
 }

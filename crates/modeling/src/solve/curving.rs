@@ -7,14 +7,17 @@
 //! times more than the forces, an exact penalty, compared with the worst of the last few shapes (Grippo, Lampariello
 //! and Lucidi 1986) because curved constraints make good whole steps look bad.
 
+use super::auto::fits;
 use super::refine::{SolveError, Solver, Stage, fresh_sides};
 use crate::constraint::{Demand, Row, curvature};
+use crate::energy::Hessian;
+use crate::system::ProblemError;
 use std::sync::Arc;
 
 /// The shape that the current program is linear around, and what is remembered of those before it.
 #[derive(Debug, Default)]
 pub(super) struct Curving {
-    from: Vec<Vec<f64>>,
+    pub(super) from: Vec<Vec<f64>>,
     /// Energies and misses of the last shapes, the newest last.
     last: Vec<(f64, Vec<f64>)>,
     /// Price of a miss, constraint by constraint.
@@ -43,6 +46,9 @@ const FAR: f64 = 100.0;
 /// A longer step than this is worth a try.
 const LITTLE: f64 = 1.5;
 
+/// Soft rows of curvature that are less than this share of the energy's stiffness are left out.
+const FAINT: f64 = 1e-12;
+
 /// A miss costs this many times the force that holds it.
 const DEAR: f64 = 1.5;
 
@@ -65,7 +71,7 @@ impl Solver {
         if !self.problem.constraints().iter().any(|c| matches!(c.demand, Demand::Curvature(_))) {
             return Ok(false);
         }
-        let to = self.coefficients();
+        let to = self.stacked();
         let finite = to.iter().flatten().all(|v| v.is_finite());
         let Some(mut curving) = self.curving.take() else {
             if !self.converged || !finite {
@@ -149,17 +155,34 @@ impl Solver {
     fn program(&mut self, curving: Curving) -> Result<bool, SolveError> {
         let forces = self.forces();
         let mut rows = self.problem.rows();
+        let linear = rows.len();
         for (seen, force) in curvature::look(&self.problem, &curving.from).iter().zip(forces) {
             seen.rows(force, &mut rows);
         }
+        // What bends next to nothing only makes factors worse.
+        let most = self.h.trace() / self.problem.space().len() as f64 * FAINT;
+        let mut number = 0;
+        rows.retain(|r| {
+            number += 1;
+            number <= linear || r.give * most <= 1.0
+        });
         let blocks = match self.problem.blocks(rows) {
             Ok((blocks, _)) => blocks,
             // What contradicts the rows here need not do so elsewhere, but there is no way to go on.
+            Err(ProblemError::Conflict { id, others, .. }) => {
+                self.notes.push(format!("constraint {id} contradicts {others}: remove one of them"));
+                return Ok(self.give_up(&curving.from));
+            }
             Err(e) => {
                 self.notes.push(e.to_string());
                 return Ok(self.give_up(&curving.from));
             }
         };
+        // Rows of curvature couple coordinates that had a matrix each.
+        if let Err(e) = blocks.iter().try_for_each(|b| fits(&b.structure, self.method)) {
+            self.notes.push(e.to_string());
+            return Ok(self.give_up(&curving.from));
+        }
         self.newton += 1;
         self.curving = Some(curving);
         self.sides = fresh_sides(&blocks);
@@ -171,7 +194,7 @@ impl Solver {
     }
 
     /// Back to the last good shape, which meets all but curvature; says what is missed.
-    fn give_up(&mut self, shape: &[Vec<f64>]) -> bool {
+    pub(super) fn give_up(&mut self, shape: &[Vec<f64>]) -> bool {
         let n = self.problem.space().len();
         for ((_, block), sides) in self.blocks.iter().zip(&mut self.sides) {
             for (side, state) in block.sides.iter().zip(sides) {
@@ -195,7 +218,9 @@ impl Solver {
             for (side, state) in block.sides.iter().zip(states) {
                 for (r, c) in side.constraints.iter().enumerate().filter(|(r, _)| structure.give[*r] == 0.0) {
                     if let Ok(at) = numbers.binary_search(c) {
-                        forces[at] = state.multipliers[r] / structure.lengths[r];
+                        // Straight places in space have two rows.
+                        let force = state.multipliers[r] / structure.lengths[r];
+                        forces[at] = if forces[at] == 0.0 { force } else { f64::hypot(forces[at], force) };
                     }
                 }
             }
@@ -209,10 +234,10 @@ impl Solver {
     }
 
     fn are_met(&self, misses: &[f64], shape: &[Vec<f64>]) -> bool {
-        let length = curvature::length(&self.problem, shape);
+        let usual = curvature::usual(&self.problem, shape);
         let seen = curvature::look(&self.problem, shape);
         let most = self.settings.tolerance.max(1e-12);
-        misses.iter().zip(seen).all(|(m, s)| m.abs() <= most * s.unit(length))
+        misses.iter().zip(seen).all(|(m, s)| m.abs() <= most * s.unit(usual))
     }
 
     /// Energy with that of the soft rows.

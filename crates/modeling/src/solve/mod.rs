@@ -19,6 +19,7 @@ mod multigrid;
 mod oracle;
 mod projected;
 mod refine;
+mod residual;
 mod response;
 mod solution;
 mod sparse;

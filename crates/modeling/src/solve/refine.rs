@@ -9,6 +9,7 @@ use super::green::Green;
 use super::method::{Method, Settings};
 use super::multigrid::{CycleGreen, Multigrid};
 use super::projected::Projected;
+use super::residual::residual;
 use super::solution::{Residual, Solution};
 use super::sparse::SparseSolver;
 use super::spectral::Spectral;
@@ -16,7 +17,7 @@ use super::thesis::Squared;
 use super::verdict;
 use super::wavelet::WaveletGreen;
 use crate::constraint::curvature;
-use crate::energy::{Operator, Scratch, twofold};
+use crate::energy::{Operator, Scratch};
 use crate::system::{Block, Problem, ProblemError, Redundant, Structure};
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -38,6 +39,12 @@ pub enum SolveError {
     /// A tolerance that is none.
     #[error("tolerance {0}: give a number between 1e-15 and 1")]
     Tolerance(f64),
+    /// An answer to a target that is not good enough to move a shape by.
+    #[error("the answer to constraint {id} did not converge: try another solver, or a larger tolerance")]
+    Response {
+        /// Name of the constraint.
+        id: String,
+    },
     /// Rows that cannot be told apart numerically.
     #[error("constraint {id} cannot be told apart from those before it: move it, or give it a weight")]
     Degenerate {
@@ -82,14 +89,16 @@ pub struct Solver {
     pub(super) problem: Problem,
     pub(super) settings: Settings,
     pub(super) method: Method,
-    why: &'static str,
+    pub(super) why: &'static str,
     /// What a choice by rule gives way to if it does not converge.
-    spare: Option<(Method, &'static str)>,
+    pub(super) spare: Option<(Method, &'static str)>,
     pub(super) h: Arc<Operator>,
     pub(super) blocks: Vec<(Arc<Structure>, Block)>,
     pub(super) notes: Vec<String>,
     /// Constraints with rows that were left out because they follow from others.
     pub(super) followers: Vec<usize>,
+    /// Constraints with rows that were left out though they are missed, which the notes say.
+    pub(super) left_out: Vec<usize>,
     /// Constraints that take part in rows that were left out.
     tied: BTreeSet<usize>,
     /// One a block, kept for other targets.
@@ -110,9 +119,9 @@ pub struct Solver {
 pub(crate) struct SideState {
     pub(crate) x: Vec<f64>,
     pub(crate) multipliers: Vec<f64>,
-    corrections: usize,
-    change: f64,
-    miss: f64,
+    pub(super) corrections: usize,
+    pub(super) change: f64,
+    pub(super) miss: f64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -138,9 +147,11 @@ impl Solver {
         blocks.iter().try_for_each(|b| fits(&b.structure, method))?;
         let spare = if settings.method == Method::Auto { spare(&problem, method) } else { None };
         let notes = notes(&problem, &redundant);
-        // Those that are missed for good are in the notes.
-        let followers = redundant.iter().filter(|r| r.miss.is_none()).map(|r| r.constraint);
-        let followers: Vec<usize> = followers.collect::<BTreeSet<usize>>().into_iter().collect();
+        let sorted = |missed: bool| -> Vec<usize> {
+            let of = redundant.iter().filter(|r| r.miss.is_some() == missed).map(|r| r.constraint);
+            of.collect::<BTreeSet<usize>>().into_iter().collect()
+        };
+        let (followers, left_out) = (sorted(false), sorted(true));
         let tied = redundant.iter().flat_map(|r| r.others.iter().copied().chain([r.constraint])).collect();
         let sides = fresh_sides(&blocks);
         let blocks: Vec<(Arc<Structure>, Block)> =
@@ -156,6 +167,7 @@ impl Solver {
             blocks,
             notes,
             followers,
+            left_out,
             tied,
             at: (0, 0),
             sides,
@@ -262,6 +274,8 @@ impl Solver {
         let (dx, dl) = corrector.correction();
         let finite = dx.iter().all(|v| v.is_finite());
         let allowed = verdict::allowed(self.settings.tolerance, verdict::scale(&self.problem, &self.blocks));
+        // A coordinate that is zero beside others has only their size to be judged by.
+        let least = 1e-6 * verdict::largest(&self.problem, &self.blocks);
         let (structure, block) = &self.blocks[b];
         let targets = &block.sides[s].targets;
         let side = &mut self.sides[b][s];
@@ -270,7 +284,7 @@ impl Solver {
             side.x.iter_mut().zip(dx).for_each(|(x, d)| *x += d);
             side.multipliers.iter_mut().zip(dl).for_each(|(l, d)| *l += d);
         }
-        let size = max(&side.x).max(f64::MIN_POSITIVE);
+        let size = max(&side.x).max(least).max(f64::MIN_POSITIVE);
         let change = if finite { max(dx) / size } else { f64::INFINITY };
         let met = verdict::worst(structure, targets, side) <= allowed;
         let (most, progress) = corrector.patience(met || self.spare.is_some());
@@ -305,27 +319,16 @@ impl Solver {
             }
         }
         if stop {
+            self.stage = Stage::Finished;
+            if let Some(curving) = self.curving.take() {
+                self.give_up(&curving.from);
+                return;
+            }
             // Sides that had no turn are zero.
-            self.converged &= self.at.0 >= self.blocks.len() && self.curving.is_none();
+            self.converged &= self.at.0 >= self.blocks.len();
             self.judge();
             self.judge_curvature();
-            self.stage = Stage::Finished;
         }
-    }
-
-    /// Starts anew with the spare method, if there is one.
-    fn give_way(&mut self) -> bool {
-        let Some((method, why)) = self.spare.take() else { return false };
-        (self.method, self.why) = (method, why);
-        for side in self.sides.iter_mut().flatten() {
-            side.x.fill(0.0);
-            side.multipliers.fill(0.0);
-            (side.corrections, side.change, side.miss) = (0, f64::INFINITY, f64::INFINITY);
-        }
-        self.correctors.iter_mut().for_each(|c| *c = None);
-        self.at = (0, 0);
-        self.stage = Stage::Residual;
-        true
     }
 
     /// Names of the constraints that take part in redundant rows: what holds one holds the others.
@@ -333,8 +336,16 @@ impl Solver {
         self.tied.iter().map(|c| self.problem.constraints()[*c].id.clone()).collect()
     }
 
-    /// The coefficients so far, coordinate by coordinate.
+    /// The coefficients so far, coordinate by coordinate; while curvature is being met, those of the last whole step.
     pub fn coefficients(&self) -> Vec<Vec<f64>> {
+        match &self.curving {
+            Some(curving) => curving.from.clone(),
+            None => self.stacked(),
+        }
+    }
+
+    /// The coefficients of all sides.
+    pub(super) fn stacked(&self) -> Vec<Vec<f64>> {
         let n = self.problem.space().len();
         let mut coefficients = vec![vec![0.0; n]; self.problem.coordinates()];
         for ((_, block), sides) in self.blocks.iter().zip(&self.sides) {
@@ -370,7 +381,9 @@ impl Solver {
             }
             Method::Cholesky => {
                 let solver = SparseSolver::new(&self.h, structure, energy.free_degree());
-                return Ok(Box::new(solver.ok_or_else(|| unfit("the matrix has no factor"))?));
+                return Ok(Box::new(
+                    solver.ok_or_else(|| unfit("the matrix has no factor; do weights differ too much?"))?,
+                ));
             }
             Method::Multigrid if structure.rows() <= auto::CYCLES || space.is_curve() => {
                 let green = CycleGreen::new(space, energy, map, &self.h);
@@ -453,45 +466,4 @@ pub(crate) fn fresh_sides(blocks: &[Block]) -> Vec<Vec<SideState>> {
         b.sides.iter().map(one).collect()
     };
     blocks.iter().map(of).collect()
-}
-
-/// What is left of both equations.
-fn residual(
-    h: &Operator,
-    block: &(Arc<Structure>, Block),
-    s: usize,
-    side: &SideState,
-    only_rows: bool,
-    scratch: &mut Scratch,
-) -> (Vec<f64>, Vec<f64>) {
-    let (structure, block) = block;
-    let targets = &block.sides[s].targets;
-    let r2: Vec<f64> = (0..structure.rows())
-        .map(|r| targets[r] - structure.apply_row(r, &side.x) + structure.give[r] * side.multipliers[r])
-        .collect();
-    let mut r1 = vec![0.0; side.x.len()];
-    if only_rows || side.corrections == 0 {
-        return (r1, r2);
-    }
-    let n = structure.n;
-    if h.lines.len() == 1 {
-        let mut sum: Vec<twofold::Twofold> = Vec::with_capacity(side.x.len());
-        for x in side.x.chunks_exact(n) {
-            sum.extend(h.apply_twofold(x).unwrap_or_default());
-        }
-        for (r, l) in side.multipliers.iter().enumerate() {
-            let (columns, values) = structure.row(r);
-            for (c, v) in columns.iter().zip(values) {
-                sum[*c as usize] = twofold::add(sum[*c as usize], twofold::product(*l, *v));
-            }
-        }
-        r1.iter_mut().zip(sum).for_each(|(r, s)| *r = -(s.0 + s.1));
-    } else {
-        for (x, y) in side.x.chunks_exact(n).zip(r1.chunks_exact_mut(n)) {
-            h.apply_exactly(x, y, scratch);
-        }
-        structure.add_transposed(&side.multipliers, 1.0, &mut r1);
-        r1.iter_mut().for_each(|r| *r = -*r);
-    }
-    (r1, r2)
 }

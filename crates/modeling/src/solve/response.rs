@@ -1,6 +1,7 @@
 //! What a solver's factors are kept for: other targets of the same constraints, and the answer to one of them.
 
 use super::refine::{SolveError, Solver, Stage, fresh_sides};
+use crate::constraint::Demand;
 use crate::system::Problem;
 
 impl Solver {
@@ -46,15 +47,21 @@ impl Solver {
     /// coordinates, redundant rows, normals, images; and where a curvature is asked for.
     ///
     /// # Errors
-    /// [`SolveError::Degenerate`].
+    /// [`SolveError::Degenerate`]; [`SolveError::Response`] where the method does not reach its tolerance.
     pub fn response(
         &mut self,
         constraint: &str,
         coordinate: usize,
     ) -> Result<Option<Vec<(usize, Vec<f64>)>>, SolveError> {
         let Some(number) = self.problem.constraints().iter().position(|c| c.id == constraint) else { return Ok(None) };
-        let Some((b, s, r)) = self.row_of(number, coordinate).filter(|_| self.newton == 0) else { return Ok(None) };
+        // Where a curvature is asked for, shapes are not linear in the targets, even if no program was needed.
+        if self.problem.constraints().iter().any(|c| matches!(c.demand, Demand::Curvature(_))) {
+            return Ok(None);
+        }
+        let Some((b, s, r)) = self.row_of(number, coordinate) else { return Ok(None) };
         let kept = (self.at, self.stage, self.iterations, self.converged);
+        // A spare method, or the limit of iterations, leaves its marks on everything.
+        let (sides, said) = (self.sides.clone(), self.notes.len());
         let zero = {
             let structure = &self.blocks[b].0;
             let mut targets = vec![0.0; structure.rows()];
@@ -64,8 +71,9 @@ impl Solver {
         let side = &mut self.blocks[b].1.sides[s];
         let targets = std::mem::replace(&mut side.targets, zero);
         let fresh = fresh_sides(std::slice::from_ref(&self.blocks[b].1)).pop().and_then(|mut s| s.pop());
-        let state = std::mem::replace(&mut self.sides[b][s], fresh.unwrap_or_default());
+        self.sides[b][s] = fresh.unwrap_or_default();
         self.at = (b, s);
+        self.converged = true;
         self.stage = Stage::Residual;
         let mut outcome = Ok(());
         while self.at == (b, s) && self.stage != Stage::Finished {
@@ -79,10 +87,16 @@ impl Solver {
                 self.at = (b, s);
             }
         }
-        let column = std::mem::replace(&mut self.sides[b][s], state);
+        let column = std::mem::take(&mut self.sides[b][s]);
+        let good = self.converged;
+        self.sides = sides;
+        self.notes.truncate(said);
         self.blocks[b].1.sides[s].targets = targets;
         (self.at, self.stage, self.iterations, self.converged) = kept;
         outcome?;
+        if !good {
+            return Err(SolveError::Response { id: constraint.to_owned() });
+        }
         let n = self.problem.space().len();
         let of = |(i, c): (usize, &usize)| (*c, column.x[i * n..][..n].to_vec());
         Ok(Some(self.blocks[b].1.sides[s].coordinates.iter().enumerate().map(of).collect()))

@@ -6,7 +6,7 @@
 use super::cholesky::dot;
 use super::correct::Correct;
 use crate::energy::Operator;
-use crate::system::Structure;
+use crate::system::{Structure, sight};
 use faer::linalg::solvers::Solve;
 use faer::sparse::linalg::solvers::Llt;
 use faer::sparse::{SparseColMat, Triplet};
@@ -27,6 +27,9 @@ pub(crate) struct SparseSolver {
 
 /// How much stiffer than H the hard rows are made.
 const RHO: f64 = 1e3;
+
+/// Rows stiffer than H by this leave nothing of it in the factor.
+const HEAVIEST: f64 = 1e15;
 
 /// A shape of no energy, what the rows make of it times the roots of their stiffness, and the square of that.
 struct Loose {
@@ -55,7 +58,9 @@ fn loose(null: &[Vec<f64>], structure: &Structure, stiffness: &[f64], size: f64)
         for z in null {
             let mut shape = vec![0.0; structure.unknowns()];
             shape[c * structure.n..][..structure.n].copy_from_slice(z);
-            let rows = stiffness.iter().enumerate().map(|(r, s)| s.sqrt() * structure.apply_row(r, &shape)).collect();
+            let most = z.iter().fold(0.0, |m: f64, z| m.max(z.abs()));
+            let value = |r: usize| sight(structure.apply_row(r, &shape), structure.size(r, c) * most);
+            let rows = stiffness.iter().enumerate().map(|(r, s)| s.sqrt() * value(r)).collect();
             let mut one = Loose { shape, rows, square: 0.0 };
             clear(&mut one, firm.iter());
             if one.square > LOOSE * size * dot(&one.shape, &one.shape) {
@@ -92,7 +97,8 @@ fn holds(loose: &[Loose]) -> Vec<usize> {
 }
 
 impl SparseSolver {
-    /// `None` where the library finds no factor; polynomials of a degree below `free` cost nothing.
+    /// `None` where the library finds no factor, and where rows weigh so much that it would lose H; polynomials of a
+    /// degree below `free` cost nothing.
     pub(crate) fn new(h: &Operator, structure: Arc<Structure>, free: usize) -> Option<SparseSolver> {
         let n = structure.n;
         let mut entries = Vec::new();
@@ -109,6 +115,9 @@ impl SparseSolver {
         }
         let rho = RHO * size;
         let stiffness: Vec<f64> = structure.give.iter().map(|g| if *g > 0.0 { 1.0 / g } else { rho }).collect();
+        if stiffness.iter().any(|s| *s > HEAVIEST * size) {
+            return None;
+        }
         for (r, by) in stiffness.iter().enumerate() {
             let (columns, values) = structure.row(r);
             for (c, v) in columns.iter().zip(values) {

@@ -2,27 +2,35 @@
 
 use super::refine::{SideState, Solver};
 use crate::constraint::{Demand, curvature};
-use crate::system::{Block, Problem, Structure};
+use crate::system::{Block, Problem, Structure, sight};
 use std::sync::Arc;
 
 /// A row of length 1 may be missed by this share of the size of the shape, whatever the tolerance.
 const MISSED: f64 = 1e-9;
+
+/// Forces whose sum is more than this share of their sizes are not in balance.
+const UNBALANCED: f64 = 1e-4;
 
 /// Missed constraints that are named.
 const NAMED: usize = 8;
 
 /// The size of the shape, about: the largest target of its linear rows, as [`Problem`] has it for conflicts.
 pub(crate) fn scale(problem: &Problem, blocks: &[(Arc<Structure>, Block)]) -> f64 {
+    problem.size(largest(problem, blocks))
+}
+
+/// The largest target of the linear rows.
+pub(crate) fn largest(problem: &Problem, blocks: &[(Arc<Structure>, Block)]) -> f64 {
     let linear = |c: usize| !matches!(problem.constraints()[c].demand, Demand::Curvature(_));
-    let mut scale = problem.least_scale();
+    let mut most = 0.0;
     for side in blocks.iter().flat_map(|b| &b.1.sides) {
         for (target, c) in side.targets.iter().zip(&side.constraints) {
-            if target.abs() > scale && linear(*c) {
-                scale = target.abs();
+            if target.abs() > most && linear(*c) {
+                most = target.abs();
             }
         }
     }
-    scale
+    most
 }
 
 /// What a row of length 1 may be missed by.
@@ -50,13 +58,18 @@ impl Solver {
             block.sides.iter().zip(states).all(|(side, state)| worst(structure, &side.targets, state) <= allowed)
         };
         let met = self.blocks.iter().zip(&self.sides).all(within);
+        if self.converged && !self.is_balanced(scale) {
+            self.notes.push("constraints weigh too little beside the energy to hold the shape".to_owned());
+            self.converged = false;
+        }
         if met && self.followers.is_empty() {
             return;
         }
-        // By name: rows that were left out are looked at as well.
+        // By name: rows that were left out because they follow from others are looked at as well.
         let coefficients = self.coefficients();
         let mut missed: Vec<(usize, f64)> = Vec::new();
-        for row in self.problem.rows().iter().filter(|r| r.give == 0.0) {
+        let noted = |c: usize| self.left_out.binary_search(&c).is_ok();
+        for row in self.problem.rows().iter().filter(|r| r.give == 0.0 && !noted(r.constraint)) {
             let value: f64 = row.entries().map(|(c, i, v)| v * coefficients[c][i]).sum();
             let miss = (value - row.target).abs();
             // What follows from others follows up to their rounding.
@@ -76,6 +89,39 @@ impl Solver {
         self.name(missed);
     }
 
+    /// False where soft rows alone hold a shape, and their forces move one that costs no energy: rounding has lost
+    /// them beside the energy.
+    fn is_balanced(&self, scale: f64) -> bool {
+        let soft = |structure: &Structure| structure.rows() > 0 && structure.give.iter().all(|g| *g > 0.0);
+        if !self.blocks.iter().any(|b| soft(&b.0)) {
+            return true;
+        }
+        let null = self.h.null_space(self.problem.energy().free_degree());
+        let rounding = allowed(self.settings.tolerance, scale);
+        for ((structure, block), states) in self.blocks.iter().zip(&self.sides).filter(|b| soft(&b.0.0)) {
+            let n = structure.n;
+            for (c, z) in (0..structure.k).flat_map(|c| null.iter().map(move |z| (c, z))) {
+                let mut shape = vec![0.0; structure.unknowns()];
+                shape[c * n..][..n].copy_from_slice(z);
+                let most = z.iter().fold(0.0, |m: f64, z| m.max(z.abs()));
+                let sees = |r: usize| sight(structure.apply_row(r, &shape), structure.size(r, c) * most);
+                let seen: Vec<f64> = (0..structure.rows()).map(|r| sees(r) / structure.give[r]).collect();
+                for (side, state) in block.sides.iter().zip(states) {
+                    let (mut sum, mut least) = (0.0, 0.0);
+                    for (r, by) in seen.iter().enumerate() {
+                        let miss = side.targets[r] - structure.apply_row(r, &state.x);
+                        sum += miss * by;
+                        least += by.abs() * (UNBALANCED * miss.abs() + rounding);
+                    }
+                    if f64::abs(sum) > least {
+                        return false;
+                    }
+                }
+            }
+        }
+        true
+    }
+
     /// One note a missed constraint.
     pub(super) fn name(&mut self, missed: Vec<(usize, f64)>) {
         let more = missed.len().saturating_sub(NAMED);
@@ -93,7 +139,7 @@ impl Solver {
         let coefficients = self.coefficients();
         let seen = curvature::look(&self.problem, &coefficients);
         let allowed = self.settings.tolerance.max(MISSED);
-        let length = curvature::length(&self.problem, &coefficients);
+        let usual = curvature::usual(&self.problem, &coefficients);
         let mut missed = Vec::new();
         for s in &seen {
             match s.miss() {
@@ -104,7 +150,7 @@ impl Solver {
                     ));
                     self.converged = false;
                 }
-                Some(miss) if miss.abs() <= allowed * s.unit(length) => {}
+                Some(miss) if miss.abs() <= allowed * s.unit(usual) => {}
                 Some(miss) => missed.push((s.constraint, miss.abs())),
             }
         }

@@ -41,6 +41,15 @@ pub(crate) struct Block {
     pub(crate) sides: Vec<Side>,
 }
 
+/// Sums that ought to cancel leave less than this share of what is summed.
+const CANCELLED: f64 = 1e-14;
+
+/// What a row sees of a shape of no energy, an entry of `A Z`: nothing where that is only the rounding of a sum of
+/// terms of this size. (Slopes and images do not see constants; solvers scale up what is small everywhere.)
+pub(crate) fn sight(value: f64, size: f64) -> f64 {
+    if value.abs() <= CANCELLED * size { 0.0 } else { value }
+}
+
 impl Structure {
     fn new(n: usize, k: usize, rows: &[Row], local: &dyn Fn(usize) -> usize) -> Structure {
         let mut out = Structure {
@@ -125,6 +134,12 @@ impl Structure {
         columns.iter().zip(values).map(|(c, v)| v * x[*c as usize]).sum()
     }
 
+    /// The sum of the entries' sizes of one row and coordinate, before any cancel.
+    pub(crate) fn size(&self, r: usize, c: usize) -> f64 {
+        let own = self.terms[r].iter().filter(|t| t.0 == c);
+        own.map(|(_, f, by)| self.functionals[*f].entries().map(|(_, v)| (by * v).abs()).sum::<f64>()).sum()
+    }
+
     /// `y = A x`.
     pub(crate) fn apply(&self, x: &[f64], y: &mut [f64]) {
         for (r, y) in y.iter_mut().enumerate() {
@@ -156,6 +171,9 @@ const ROUNDING: f64 = 1e-12;
 /// Shapes below this share of the longest side of their domain are zero for all that anyone can tell.
 const NOTHING: f64 = 1e-3;
 
+/// Targets are nothing but rounding up to this share of the size of a shape of nothing but zeros.
+const RUBBLE: f64 = 5e-13;
+
 /// Rows that take part with less than this are not named.
 const NAMED: f64 = 1e-7;
 
@@ -165,6 +183,27 @@ pub(crate) struct Redundant {
     pub(crate) others: Vec<usize>,
     /// How far it is missed, where that is more than rounding: rows too near to others to be told apart.
     pub(crate) miss: Option<f64>,
+}
+
+impl Redundant {
+    /// One a constraint, in order of the first row of each, with the worst miss of its coordinates.
+    fn by_constraint(rows: Vec<Redundant>) -> Vec<Redundant> {
+        let mut out: Vec<Redundant> = Vec::new();
+        for row in rows {
+            let Some(known) = out.iter_mut().find(|r| r.constraint == row.constraint) else {
+                out.push(row);
+                continue;
+            };
+            known.others.extend(row.others);
+            known.others.sort_unstable();
+            known.others.dedup();
+            known.miss = match (known.miss, row.miss) {
+                (Some(a), Some(b)) => Some(a.max(b)),
+                (a, b) => a.or(b),
+            };
+        }
+        out
+    }
 }
 
 impl Problem {
@@ -215,7 +254,7 @@ impl Problem {
                     blocks.iter_mut().find(|(first, b)| b.structure.k == 1 && same(first, &rows))
             {
                 let _ = first;
-                let kept: Vec<Row> = self.independent(&rows, scale, &mut Vec::new(), &coordinates)?;
+                let kept: Vec<Row> = self.independent(&rows, scale, &mut redundant, &coordinates)?;
                 block.sides.push(side(&kept, coordinates));
                 continue;
             }
@@ -225,14 +264,19 @@ impl Problem {
             let sides = vec![side(&kept, coordinates.clone())];
             blocks.push((rows, Block { structure, sides }));
         }
-        Ok((blocks.into_iter().map(|b| b.1).collect(), redundant))
+        Ok((blocks.into_iter().map(|b| b.1).collect(), Redundant::by_constraint(redundant)))
     }
 
     /// The size of the shape, about: the largest target of any coordinate (rows have length 1, so that all are in units
     /// of coefficients). Heights of zero beside others come from sums that cancel. A shape of nothing but zeros has
     /// only its domain to go by.
     fn scale(&self, rows: &[Row]) -> f64 {
-        rows.iter().fold(self.least_scale(), |m: f64, r| m.max(r.target.abs()))
+        self.size(rows.iter().fold(0.0, |m: f64, r| m.max(r.target.abs())))
+    }
+
+    /// The size of a shape whose largest target is this: that of its domain where it is nothing but rounding.
+    pub(crate) fn size(&self, largest: f64) -> f64 {
+        if largest > RUBBLE * self.least_scale() { largest } else { self.least_scale() }
     }
 
     /// The size of a shape of nothing but zeros.

@@ -7,7 +7,7 @@ mod block;
 mod dependence;
 mod space;
 
-pub(crate) use block::{Block, Redundant, Structure, merged};
+pub(crate) use block::{Block, Redundant, Structure, merged, sight};
 pub(crate) use dependence::sparse_dot;
 pub use space::Space;
 

@@ -9,7 +9,7 @@ use crate::solve::bpx::dense_factor;
 use crate::solve::cholesky::{Cholesky, dot, start};
 use crate::solve::correct::Correct;
 use crate::solve::projected::{Projected, schur};
-use crate::system::{Problem, Structure};
+use crate::system::{Problem, Structure, sight};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -183,6 +183,7 @@ impl Active {
         self.cover = cover.splines();
         let null: Vec<Vec<f64>> = self.null.iter().map(|z| [&z[..], &vec![0.0; n - z.len()]].concat()).collect();
         let null = Arc::new(null);
+        let corner = self.corner();
         let mut out = Solved::default();
         for part in &mut self.parts {
             let all = &part.structure;
@@ -197,7 +198,15 @@ impl Active {
                 .map(|(c, z)| {
                     let mut x = vec![0.0; n * all.k];
                     x[c * n..][..n].copy_from_slice(z);
-                    every.iter().map(|r| full.apply_row(*r, &x)).collect()
+                    let most = z.iter().fold(0.0, |m: f64, z| m.max(z.abs()));
+                    let value = |r: &usize| {
+                        let size = all.terms[*r].iter().filter(|t| t.0 == c).flat_map(|t| {
+                            let coarse = green.lists[t.1].iter().filter(|e| (e.0 as usize) < corner);
+                            coarse.map(|e| (t.2 * e.1).abs())
+                        });
+                        sight(full.apply_row(*r, &x), size.sum::<f64>() * most)
+                    };
+                    every.iter().map(value).collect()
                 })
                 .collect();
             let (hierarchy, numbers) = (&self.hierarchy, &self.numbers);

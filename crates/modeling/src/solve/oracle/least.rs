@@ -15,13 +15,16 @@ pub(super) fn cells_are_square(space: &Space) -> bool {
     (1.0 / SQUARE..=SQUARE).contains(&(s.density() / t.density()))
 }
 
-/// The least energy, soft rows included, by the solver that `auto` picks.
+/// The least energy, soft rows included, by the solver that `auto` picks, or a sparse factor where that one fails.
 ///
 /// # Errors
 /// [`SolveError`], and [`SolveError::Method`] where it does not converge.
 pub(super) fn energy(problem: &Problem) -> Result<f64, SolveError> {
     let settings = Settings { tolerance: 1e-9, ..Settings::default() };
-    let full = Solver::new(problem.clone(), settings)?.run()?;
+    let mut full = Solver::new(problem.clone(), settings)?.run()?;
+    if !full.converged() {
+        full = Solver::new(problem.clone(), Settings { method: Method::Cholesky, ..settings })?.run()?;
+    }
     if !full.converged() {
         let why = "its cells are far from square, and the full solution to compare with did not converge";
         return Err(SolveError::Method { method: Method::Wavelet, why });

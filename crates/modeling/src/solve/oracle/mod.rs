@@ -14,7 +14,9 @@ mod active;
 mod cover;
 mod hierarchy;
 mod least;
+mod offset;
 mod values;
+mod wake;
 
 use super::method::Method;
 use super::refine::{SolveError, notes};
@@ -71,6 +73,8 @@ pub struct Oracle {
     h: Arc<Operator>,
     notes: Vec<String>,
     active: Active,
+    /// What was taken off each coordinate's targets.
+    means: Vec<f64>,
     bound: f64,
     phase: Phase,
     /// Functions that were put to sleep: how often, and whether they sleep now.
@@ -125,16 +129,11 @@ const CLOSEST: f64 = 1e-8;
 const SETTLED: f64 = 0.1;
 /// Energies below the least by more than this share of the bound are not to be trusted.
 const BELOW: f64 = 0.01;
-/// Active functions whose squared coefficient is this share of the allowed energy, divided by their number, have
-/// children and neighbours.
-const COUNTS: f64 = 0.05;
-/// How often a function may be put to sleep.
-const SLEEPS: u8 = 2;
-/// Functions that a round wakes for an unmet row.
-const NEARBY: usize = 4;
 /// Control points a constraint from which on the oracle is faster than all wavelets, without open axes and with one:
 /// `cargo bench --bench oracle`.
 const PAYS: [f64; 2] = [3000.0, 100.0];
+/// Energies below this share of what rounding may make of them are zero.
+const NOTHING: f64 = 1e-8;
 /// Trials of dropping.
 const TRIALS: usize = 6;
 
@@ -156,7 +155,8 @@ impl Oracle {
         if problem.constraints().iter().any(|c| matches!(c.demand, Demand::Curvature(_))) {
             return Err(unfit("an adaptive set of wavelets takes no curvature constraints"));
         }
-        let (blocks, redundant) = problem.blocks(problem.rows())?;
+        let (mut blocks, redundant) = problem.blocks(problem.rows())?;
+        let means = offset::take_off(&mut blocks, problem.coordinates());
         let h = Arc::new(Operator::new(problem.space(), problem.energy(), None));
         let none = || unfit("the axes have no common pyramid");
         let hierarchy = Hierarchy::new(problem.space(), problem.energy(), &h).ok_or_else(none)?;
@@ -167,6 +167,7 @@ impl Oracle {
             h,
             notes,
             active,
+            means,
             bound,
             phase: Phase::Grow,
             asleep: BTreeMap::new(),
@@ -245,6 +246,12 @@ impl Oracle {
         (self.bound * self.last.energy).max(self.last.noise)
     }
 
+    /// The energy above the least that may be promised: rounding is an excuse only for energies that are nothing else.
+    fn promised(&self) -> f64 {
+        let nothing = self.least.unwrap_or(self.last.energy) <= NOTHING * self.last.noise;
+        if nothing { self.allowed() } else { self.bound * self.last.energy }
+    }
+
     /// True where more iterations would change next to nothing.
     fn is_settled(&self) -> bool {
         self.last.left <= SETTLED * self.allowed()
@@ -283,7 +290,9 @@ impl Oracle {
         let sum = sum(&gains);
         let mut gains = gains.functions;
         gains.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        self.excess = self.least.map_or(REACH * sum + self.last.left, |least| self.last.energy - least);
+        // Nothing is below zero, whatever rounding made of the least.
+        let above = |least: f64| if self.last.energy > 0.0 { self.last.energy - least } else { 0.0 };
+        self.excess = self.least.map_or(REACH * sum + self.last.left, above);
         if self.least.is_some() && self.excess > (GROWTH * allowed).max(REACH * sum) && self.share > CLOSEST {
             // Nobody would gain what is left: it is the iteration's.
             self.share *= 0.01;
@@ -311,7 +320,8 @@ impl Oracle {
             return Ok(());
         }
         let below = (BELOW * allowed).max(self.last.noise);
-        self.converged = (-below..=allowed).contains(&self.excess);
+        let promised = self.promised();
+        self.converged = (-below..=promised).contains(&self.excess);
         self.excess = self.excess.max(0.0);
         if !self.converged {
             self.notes.push("the active functions do not come as near to the least energy as was asked".to_owned());
@@ -321,7 +331,7 @@ impl Oracle {
         let mut order: Vec<(f64, Function)> =
             squares.iter().copied().zip(self.active.functions.iter().copied()).skip(corner).collect();
         order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        let budget = MARGIN * (allowed - self.excess).max(0.0);
+        let budget = MARGIN * (promised - self.excess).max(0.0);
         // Coefficients of functions of unit energy: the sum of their squares is about the energy that dropping costs.
         let count = |most: f64| {
             let mut sum = 0.0;
@@ -373,79 +383,6 @@ impl Oracle {
         Ok(())
     }
 
-    /// Functions that may wake: near active ones whose squared coefficients count, on the same level and the next.
-    fn candidates(&self, squares: &[f64], allowed: f64) -> Vec<Function> {
-        let h = &self.active.hierarchy;
-        let enough = COUNTS * allowed / squares.len() as f64;
-        // Seats (coarse cells) by rise.
-        let mut seats: Vec<BTreeSet<(u32, u32)>> = vec![BTreeSet::new(); h.rises.len()];
-        let around = |level: usize, side: usize, seat: u32| -> std::ops::RangeInclusive<u32> {
-            let last = h.levels[level][side].spans as u32 - 1;
-            seat.saturating_sub(1)..=(seat + 1).min(last)
-        };
-        for (f, square) in self.active.functions.iter().zip(squares) {
-            let Some(r) = usize::from(f.rise).checked_sub(1) else { continue };
-            if *square < enough {
-                continue;
-            }
-            let (i, j) = (h.rises[r][0].centre[f.s as usize], h.rises[r][1].centre[f.t as usize]);
-            for a in around(r, 0, i) {
-                seats[r].extend(around(r, 1, j).map(|b| (a, b)));
-            }
-            if let Some(finer) = seats.get_mut(r + 1) {
-                let halves = if h.levels[r + 1][0].spans > h.levels[r][0].spans { 2 } else { 1 };
-                for a in 0..halves {
-                    finer.extend((0..2).map(|b| (halves * i + a, 2 * j + b)));
-                }
-            }
-        }
-        let [s, t] = &h.levels[0];
-        seats[0].extend((0..s.spans as u32).flat_map(|a| (0..t.spans as u32).map(move |b| (a, b))));
-        let mut out = Vec::new();
-        for (r, seats) in seats.iter().enumerate() {
-            let [rs, rt] = &h.rises[r];
-            for (a, b) in seats {
-                for i in &rs.seated[*a as usize] {
-                    for j in rt.seated[*b as usize].iter().filter(|j| !h.is_smooth(r, *i, **j)) {
-                        let f = Function { rise: r as u8 + 1, s: *i, t: *j };
-                        if !self.active.is_active(f) && !self.asleep.get(&f).is_some_and(|s| s.1) {
-                            out.push(f);
-                        }
-                    }
-                }
-            }
-        }
-        out
-    }
-
-    /// Active functions that hardly count and have not been put to sleep too often.
-    fn negligible(&self, squares: &[f64], allowed: f64) -> Vec<Function> {
-        let (corner, few) = (self.active.corner(), allowed / squares.len() as f64);
-        let all = self.active.functions.iter().zip(squares).skip(corner);
-        let small = all.filter(|(f, square)| **square < few && self.asleep.get(f).is_none_or(|s| s.0 < SLEEPS));
-        small.map(|(f, _)| *f).collect()
-    }
-
-    /// The inactive functions that see the unmet constraints best, a few a row.
-    fn nearby(&self) -> Vec<Function> {
-        let h = &self.active.hierarchy;
-        let mut out = BTreeSet::new();
-        for part in &self.active.parts {
-            for row in &part.left_out {
-                let mut seen: BTreeMap<Function, f64> = BTreeMap::new();
-                for &(_, f, by) in &part.structure.terms[*row] {
-                    for (f, v) in part.seen[f].all(h).filter(|e| !self.active.is_active(e.0)) {
-                        *seen.entry(f).or_default() += (by * v * h.height(f)).powi(2);
-                    }
-                }
-                let mut seen: Vec<(Function, f64)> = seen.into_iter().filter(|e| e.1 > 0.0).collect();
-                seen.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-                out.extend(seen.into_iter().take(NEARBY).map(|e| e.0));
-            }
-        }
-        out.into_iter().collect()
-    }
-
     /// Puts functions to sleep and wakes others.
     fn change(&mut self, sleep: &[Function], wake: Vec<Function>) {
         for f in sleep {
@@ -485,7 +422,10 @@ impl Oracle {
     /// The solution so far; its coefficients are those of the finest B-splines.
     pub fn solution(&self) -> Solution {
         let problem = &self.problem;
-        let coefficients = self.active.coefficients(problem.coordinates());
+        let mut coefficients = self.active.coefficients(problem.coordinates());
+        for (x, mean) in coefficients.iter_mut().zip(&self.means).filter(|e| *e.1 != 0.0) {
+            x.iter_mut().for_each(|x| *x += mean);
+        }
         let residuals = Residual::all(problem, &problem.rows(), &coefficients);
         let why = "asked for: an adaptive set of wavelets";
         Solution::new(

@@ -1,0 +1,106 @@
+//! Well-formed problems of unusual shape: solved like others, or said not to be.
+
+use ondelette_modeling::Axis;
+use ondelette_modeling::constraint::{Constraint, Demand};
+use ondelette_modeling::energy::Energy;
+use ondelette_modeling::solve::{Method, Oracle, Settings, Solution, Solver};
+use ondelette_modeling::system::{Problem, Space};
+use ondelette_wavelet::Boundary;
+
+fn surface(boundary: Boundary, spans: usize) -> Space {
+    let axis = Axis::new(boundary, spans, [0.0, 1.0]).unwrap();
+    Space::surface(axis, axis)
+}
+
+fn slope(id: &str, at: [f64; 2], axis: usize, by: f64) -> Constraint {
+    Constraint::new(id, &at, Demand::Derivative(axis, vec![Some(by)]))
+}
+
+fn run(problem: &Problem, method: Method) -> Solution {
+    let settings = Settings { method, ..Settings::default() };
+    Solver::new(problem.clone(), settings).and_then(Solver::run).unwrap()
+}
+
+#[test]
+fn slopes_and_images_alone_are_enough_for_every_solver() {
+    let slopes = vec![
+        slope("a", [0.37, 0.41], 0, 1.0),
+        slope("b", [0.37, 0.41], 1, 0.5),
+        slope("c", [0.77, 0.21], 0, -1.0),
+        slope("d", [0.77, 0.21], 1, 0.5),
+    ];
+    let image = |id: &str, at: [f64; 2], of: [f64; 2]| {
+        Constraint::new(id, &at, Demand::Image { of: of.to_vec(), factors: vec![1.0], offset: vec![0.33] })
+    };
+    let images = vec![image("near", [0.2, 0.3], [0.2, 0.3001]), image("far", [0.1, 0.2], [0.7, 0.8])];
+    let soft = vec![slope("soft", [0.73, 0.74], 1, 190.0).soft(1e4)];
+    for (name, rows) in [("slopes", &slopes), ("images", &images), ("soft", &soft)] {
+        for boundary in [Boundary::Open, Boundary::Mirrored, Boundary::Periodic] {
+            for spans in [16, 32] {
+                let energy = Energy::new(0.1, 1.0, 0.0).unwrap();
+                let problem = Problem::new(surface(boundary, spans), 1, energy, None, rows.clone()).unwrap();
+                let with_soft = |s: &Solution| {
+                    let soft = |r: &&ondelette_modeling::solve::Residual| r.soft;
+                    s.energy() + s.residuals().iter().filter(soft).map(|r| 1e4 * r.miss.powi(2)).sum::<f64>()
+                };
+                let want = run(&problem, Method::Cholesky);
+                assert!(want.converged(), "{name} {boundary:?} {spans}: {:?}", want.notes());
+                let mut methods = vec![Method::Auto, Method::Bpx, Method::Multigrid, Method::Wavelet];
+                methods.extend((boundary != Boundary::Open).then_some(Method::Spectral));
+                for method in methods {
+                    let found = run(&problem, method);
+                    let over = with_soft(&found) / with_soft(&want) - 1.0;
+                    assert!(found.converged(), "{name} {boundary:?} {spans} {method}: {:?}", found.notes());
+                    assert!(over.abs() < 1e-6, "{name} {boundary:?} {spans} {method}: {over:e}");
+                }
+                let few = Oracle::new(problem, 1e-3).and_then(Oracle::run).unwrap();
+                let over = with_soft(&few) / with_soft(&want) - 1.0;
+                assert!(few.converged(), "{name} {boundary:?} {spans} adaptive: {:?}", few.notes());
+                assert!((-1e-6..1e-3).contains(&over), "{name} {boundary:?} {spans} adaptive: {over:e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_coordinate_that_is_zero_is_as_good_as_any() {
+    let at = |id: &str, t: f64, x: f64, y: f64| Constraint::new(id, &[t], Demand::Position(vec![Some(x), Some(y)]));
+    // What is soft would pull y away from zero, but is at a point that is held there.
+    let pulled = at("soft", 0.3, 1.0, 0.1).soft(1e6);
+    let rows = vec![at("a", 0.0, 0.0, 0.0), at("b", 0.3, 1.0, 0.0), at("c", 1.0, 2.0, 0.0), pulled];
+    for boundary in [Boundary::Mirrored, Boundary::Open] {
+        let space = Space::curve(Axis::new(boundary, 32, [0.0, 1.0]).unwrap());
+        for energy in [Energy::BEND, Energy::new(1.0, 1.0, 0.0).unwrap()] {
+            let problem = Problem::new(space.clone(), 2, energy, None, rows.clone()).unwrap();
+            for method in [Method::Auto, Method::Bpx, Method::Multigrid, Method::Wavelet, Method::Cholesky] {
+                let found = run(&problem, method);
+                assert!(found.converged(), "{boundary:?} {method}: {:?}", found.notes());
+                let y = found.coefficients()[1].iter().fold(0.0, |m: f64, y| m.max(y.abs()));
+                assert!(y < 1e-9, "{boundary:?} {method}: {y:e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn weights_that_drown_the_energy_are_refused_by_a_factor_of_their_sum() {
+    let at =
+        |id: &str, t: f64, y: f64, weight: f64| Constraint::new(id, &[t], Demand::Position(vec![Some(y)])).soft(weight);
+    let space = Space::curve(Axis::new(Boundary::Open, 16, [0.0, 1.0]).unwrap());
+    for power in (0..=100).step_by(4) {
+        let w = 10.0_f64.powi(power);
+        let rows = vec![at("a", 0.0, 0.0, w), at("b", 0.25, 0.7, w), at("c", 0.5, 1.0, w), at("d", 1.0, 0.0, w)];
+        let problem = Problem::new(space.clone(), 1, Energy::BEND, None, rows).unwrap();
+        let want = run(&problem, Method::Banded);
+        assert!(want.converged(), "1e{power}");
+        let settings = Settings { method: Method::Cholesky, ..Settings::default() };
+        match Solver::new(problem, settings).and_then(Solver::run) {
+            Ok(found) if found.converged() => {
+                let over = found.energy() / want.energy() - 1.0;
+                assert!(power <= 20 && over.abs() < 1e-9, "1e{power}: {over:e}");
+            }
+            Ok(_) => {}
+            Err(e) => assert!(power > 16 && e.to_string().contains("weights"), "1e{power}: {e}"),
+        }
+    }
+}
