@@ -21,8 +21,8 @@ const ALIKE: f64 = 3.0;
 type Values = [[f64; 3]; 2];
 
 /// The same field with its corners averaged: coefficients of all functions in the order of `gathers`; and half the
-/// difference of its halves, treated alike. Parallelograms with bases of the second order only; others, and elements partly inside of
-/// something, are left as they are.
+/// difference of its halves, treated alike. Parallelograms with bases of the second order only; others, and elements
+/// partly inside of something, are left as they are.
 pub(super) fn stitched(
     forest: &Forest,
     (gathers, slots): (&[Gather], &Slots),
