@@ -277,7 +277,7 @@ impl Sampled {
 
     /// Residual at which a solve ends: no finer than the present error needs, which is refined anyway.
     fn wanted(&self) -> f64 {
-        0.1 * self.settings.error.max(self.precision) / self.amplification
+        0.1 * self.precision / self.amplification
     }
 
     /// Residual relative to the whole irradiance.

@@ -239,7 +239,7 @@ impl Sampled {
             stalled: false,
             missed: Vec::new(),
             error: f64::INFINITY,
-            precision: FIRST_PRECISION,
+            precision: settings.error.max(FIRST_PRECISION),
             statistics: Statistics::default(),
         }
     }

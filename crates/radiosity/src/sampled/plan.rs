@@ -66,7 +66,7 @@ impl Sampled {
         // in the dark, all that may be missed is all there is
         let dark = if missed > 0.0 { 1.0 } else { 0.0 };
         self.error = if self.whole > 0.0 { SAFETY * missed / self.whole + unsolved } else { dark };
-        self.precision = (0.3 * self.error).min(FIRST_PRECISION);
+        self.precision = self.settings.error.max((0.3 * self.error).min(FIRST_PRECISION));
         self.missed.iter_mut().for_each(|m| *m *= SAFETY);
         self.rounds += 1;
         self.refitted = false;
