@@ -67,7 +67,7 @@ impl Gather {
     /// Most points of an element.
     pub(super) const MOST_POINTS: usize = 64;
     /// Directions of a point and half that iterations use; sweeps use all.
-    pub(super) const FIRST: u32 = 4;
+    pub(super) const FIRST: u32 = 6;
 
     /// At a point in each of 16 or 4 equal parts, or in two of these 4, without samples.
     pub(super) fn new(forest: &Forest, node: NodeId, grain: Grain) -> Self {
