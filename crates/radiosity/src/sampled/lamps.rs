@@ -23,7 +23,7 @@ pub(super) const MOST_GROUPS: usize = 32;
 /// by about this factor (against independent paths in furnished rooms), and by more below an error of `CLEAR`, since
 /// what they miss falls more slowly than what they see.
 const DOUBT: f64 = 1.35;
-const CLEAR: f64 = 0.02;
+const CLEAR: f64 = 0.03;
 const FINER: f64 = 0.3;
 /// Blockers up to which the visible part of a lamp is cut out exactly; beyond, rays decide.
 const MOST_BLOCKERS: usize = 24;
