@@ -10,6 +10,7 @@
 
 use super::field::{self, Field, Form};
 use super::gather;
+use super::plan::UNSOLVED;
 use super::verdict::Verdict;
 use super::{Phase, RAYS_A_STEP, Sampled, Scratch, positive, stitch};
 use crate::solver::Event;
@@ -34,6 +35,9 @@ const SPREAD_TOLERANCE: f64 = 0.15;
 /// Most Krylov vectors for it.
 const SPREAD_STEPS: usize = 12;
 
+/// What a sweep left over is solved to this share of it: the next sweep says what the first samples got wrong, which
+/// is more.
+const SOLVED: f64 = 0.1;
 /// What is left over reaches this many times as much as direct light does, where that is less than the worst case of
 /// the brightest material everywhere.
 const AMPLIFIED: f64 = 3.0;
@@ -47,6 +51,15 @@ pub(super) struct Sweep {
     gathered: Vec<[f64; 3]>,
     apart: Vec<[f64; 3]>,
     done: usize,
+}
+
+/// What a sweep left over, on its way.
+pub(super) struct Left {
+    gmres: Box<Gmres<3>>,
+    /// Half the difference of the halves in that sweep.
+    apart: Vec<[f64; 3]>,
+    /// The residual at which the solve ends.
+    wanted: f64,
 }
 
 /// The scatter on its way.
@@ -118,34 +131,57 @@ impl Sampled {
         let pairs = sweep.gathered.iter().zip(&self.indirect);
         let residual = pairs.map(|(g, i)| std::array::from_fn(|c| g[c] - i[c])).collect();
         let gmres = Gmres::new(self.indirect.clone(), residual, self.weights());
-        let left = self.relative(&gmres);
+        let left = self.relative(gmres.residual());
         self.statistics.residual = left;
         if left > self.wanted() && self.corrections < MOST_CORRECTIONS {
-            self.corrections += 1;
-            self.phase = Phase::Solving(Box::new(gmres));
+            let wanted = (SOLVED * left).max(0.3 * self.wanted());
+            self.phase = Phase::Solving(Left { gmres: Box::new(gmres), apart: sweep.apart, wanted });
             return;
         }
-        self.corrections = 0;
-        self.indirect = sweep.gathered;
-        let passed = vec![[0.0; 3]; self.indirect.len()];
-        self.start_spreading(sweep.apart, passed, 0, left * self.amplification);
+        self.take(sweep.gathered, sweep.apart, left);
     }
 
-    pub(super) fn solve(&mut self, mut gmres: Box<Gmres<3>>) -> Event {
-        let (now, wanted) = (self.relative(&gmres), 0.3 * self.wanted());
+    /// Takes what a sweep gathered for the solution; `left` over is what all reflections make no more of than the
+    /// amplification.
+    fn take(&mut self, gathered: Vec<[f64; 3]>, apart: Vec<[f64; 3]>, left: f64) {
+        self.corrections = 0;
+        self.indirect = gathered;
+        let passed = vec![[0.0; 3]; self.indirect.len()];
+        self.start_spreading(apart, passed, 0, left * self.amplification);
+    }
+
+    pub(super) fn solve(&mut self, mut left: Left) -> Event {
+        let gmres = &mut left.gmres;
+        let (now, wanted) = (self.relative(gmres.residual()), left.wanted);
         let direction =
             if now <= wanted || gmres.steps() >= self.krylov_vectors(RESTART) { None } else { gmres.direction() };
         let Some(direction) = direction else {
+            self.corrections += 1;
             self.indirect = gmres.solution();
             self.start_sweeping();
             return Event::Iterated { iterations: self.statistics.iterations, residual: now, wanted };
         };
         let product = self.apply(direction);
-        gmres.supply(product);
         self.statistics.iterations += 1;
-        let event = Event::Iterated { iterations: self.statistics.iterations, residual: self.relative(&gmres), wanted };
-        self.phase = Phase::Solving(gmres);
-        event
+        if gmres.steps() == 0 {
+            // the light that was gathered contains the residual: what it lacks is what others reflect of that, which
+            // is less, for light that scatters evens out
+            let lengths = gmres.residual();
+            let passed = direction.iter().zip(&product).map(|(x, p)| std::array::from_fn(|c| x[c] - p[c]));
+            let passed: Vec<[f64; 3]> = passed.collect();
+            let passed = Gmres::new(passed.clone(), passed, self.weights()).residual();
+            let lacking = self.relative(std::array::from_fn(|c| lengths[c] * passed[c]));
+            if lacking <= self.wanted() {
+                let gathered = self.indirect.iter().zip(direction);
+                let gathered = gathered.map(|(i, x)| std::array::from_fn(|c| i[c] + lengths[c] * x[c])).collect();
+                self.take(gathered, left.apart, lacking);
+                return Event::Iterated { iterations: self.statistics.iterations, residual: lacking, wanted };
+            }
+        }
+        gmres.supply(product);
+        let residual = self.relative(gmres.residual());
+        self.phase = Phase::Solving(left);
+        Event::Iterated { iterations: self.statistics.iterations, residual, wanted }
     }
 
     /// x - K r x with the first samples.
@@ -277,13 +313,13 @@ impl Sampled {
 
     /// Residual at which a solve ends: no finer than the present error needs, which is refined anyway.
     fn wanted(&self) -> f64 {
-        0.1 * self.precision / self.amplification
+        UNSOLVED * self.precision / self.amplification
     }
 
     /// Residual relative to the whole irradiance.
-    fn relative(&self, gmres: &Gmres<3>) -> f64 {
+    fn relative(&self, residual: [f64; 3]) -> f64 {
         let whole = if self.whole > 0.0 { self.whole } else { self.integral_of_direct() };
-        let r = gmres.residual().iter().sum::<f64>() * self.counted_area.sqrt();
+        let r = residual.iter().sum::<f64>() * self.counted_area.sqrt();
         if whole > 0.0 { r / whole } else { 0.0 }
     }
 }

@@ -17,9 +17,6 @@ use ondelette_wavelet::cell::CellShape;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-/// How finely what is lit anew is balanced, in units of the promise.
-const FINELY: f64 = 0.05;
-
 /// The samples behind a solution, as flat arrays: see [`Kept::check`] for what fits what.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Kept {
@@ -241,7 +238,7 @@ impl Sampled {
         (self.aim, self.rounds, self.corrections) = (plan::AIM, 0, 0);
         (self.refitted, self.stalled, self.error, self.whole) = (false, false, f64::INFINITY, 0.0);
         // the samples may be as good as they need be: nothing more is left over by the balance
-        self.precision = FINELY * self.settings.error;
+        self.precision = plan::FINELY * self.settings.error;
         // from the dark: the same light, whatever was balanced before
         self.indirect.fill([0.0; 3]);
         self.start_sweeping();

@@ -19,7 +19,7 @@ const LEAF_ARRAYS: usize = 2;
 /// Krylov vectors that a solve has at least.
 const LEAST_KRYLOV: usize = 4;
 /// Vectors of the gathered light at a time: the solution, what is added up, and the least of a solve.
-const WORKING_VECTORS: u64 = 7 + LEAST_KRYLOV as u64;
+const WORKING_VECTORS: u64 = 8 + LEAST_KRYLOV as u64;
 /// What the allocator adds to each of the arrays of a gathering element.
 const BESIDE_AN_ARRAY: usize = 16;
 /// Share of what is allowed that is counted on: between arrays that grow, some is lost.

@@ -36,13 +36,12 @@ use crate::scene::Scene;
 use crate::settings::Settings;
 use crate::solution::{Solution, Statistics};
 use crate::solver::{Event, SolveError};
-use balance::{Spread, Sweep};
+use balance::{Left, Spread, Sweep};
 use direct::Known;
 use field::Form;
 use gather::{Draw, Gather};
 use lamps::Lamps;
 use ondelette_compress::{Forest, Links, NodeId, transport};
-use ondelette_numerics::krylov::Gmres;
 use ondelette_numerics::par;
 use points::Grain;
 use slots::Slots;
@@ -81,7 +80,7 @@ enum Phase {
     /// Gathering the present solution with all samples.
     Sweeping(Sweep),
     /// Balancing with the first samples of every element: towards the solution, or the scatter's way through it.
-    Solving(Box<Gmres<3>>),
+    Solving(Left),
     Spreading(Spread),
     /// Judged; what comes next is still to be planned.
     Judged,
@@ -257,7 +256,7 @@ impl Sampled {
             Phase::Fitting { nodes, done, draws } => Some(self.fit(nodes, done, draws)),
             Phase::Casting { draws, done } => Some(self.cast(draws, done)),
             Phase::Sweeping(sweep) => Some(self.sweep(sweep)),
-            Phase::Solving(gmres) => Some(self.solve(gmres)),
+            Phase::Solving(left) => Some(self.solve(left)),
             Phase::Spreading(spread) => Some(self.spread(spread)),
             Phase::Judged => {
                 self.spend();

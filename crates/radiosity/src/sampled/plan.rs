@@ -15,6 +15,10 @@ use ondelette_compress::NodeId;
 /// The estimate of the mean absolute error times this is above it also where estimates are low: among furniture, and
 /// at the sharpest edges.
 const SAFETY: f64 = 1.35;
+/// Share of the precision asked of a balance that it may leave over, and how finely what is lit anew is balanced, in
+/// units of the promise.
+pub(super) const UNSOLVED: f64 = 0.1;
+pub(super) const FINELY: f64 = 0.3;
 /// Share of the promise that is aimed at.
 pub(super) const AIM: f64 = 0.95;
 /// Mean absolute value of a scattered number, over its standard deviation.
@@ -65,6 +69,8 @@ impl Sampled {
         }
         // in the dark, all that may be missed is all there is
         let dark = if missed > 0.0 { 1.0 } else { 0.0 };
+        // what lighting anew may leave over counts from the first, so that the same lamps keep the promise
+        let unsolved = unsolved.max(UNSOLVED * FINELY * self.settings.error);
         self.error = if self.whole > 0.0 { SAFETY * missed / self.whole + unsolved } else { dark };
         self.precision = self.settings.error.max((0.3 * self.error).min(FIRST_PRECISION));
         self.missed.iter_mut().for_each(|m| *m *= SAFETY);
