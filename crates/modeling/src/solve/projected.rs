@@ -9,7 +9,7 @@ use super::cholesky::{dot, start};
 use super::correct::Correct;
 use super::green::{Green, Inverse};
 use crate::energy::{Hessian, Scratch};
-use crate::system::{Structure, sight};
+use crate::system::Structure;
 use std::sync::Arc;
 
 /// The solver of one structure. Vectors hold the unknowns and, behind them, the misses u of the soft rows: unknowns of
@@ -116,16 +116,7 @@ impl Projected {
         let s = schur(&structure, &mut *green);
         let mut y = Vec::new();
         for c in 0..structure.k {
-            let sizes: Vec<f64> = (0..m).map(|r| structure.size(r, c)).collect();
-            for z in null.iter() {
-                let most = z.iter().fold(0.0, |m: f64, z| m.max(z.abs()));
-                let value = |r: usize| -> f64 {
-                    let own = structure.terms[r].iter().filter(|t| t.0 == c);
-                    let sum = own.map(|t| t.2 * structure.functionals[t.1].apply(z)).sum();
-                    sight(sum, sizes[r] * most)
-                };
-                y.push((0..m).map(value).collect());
-            }
+            y.extend(null.iter().map(|z| structure.sight(c, z)));
         }
         let border = Border::new(s, m, y)?;
         Ok(Projected::bordered(h, structure, green, null, border, tolerance, most))

@@ -61,7 +61,8 @@ impl Solver {
         let Some((b, s, r)) = self.row_of(number, coordinate) else { return Ok(None) };
         let kept = (self.at, self.stage, self.iterations, self.converged);
         // A spare method, or the limit of iterations, leaves its marks on everything.
-        let (sides, said) = (self.sides.clone(), self.notes.len());
+        let fresh = self.blocks.iter().map(|(_, block)| fresh_sides(std::slice::from_ref(block)).remove(0)).collect();
+        let (sides, said) = (std::mem::replace(&mut self.sides, fresh), self.notes.len());
         let zero = {
             let structure = &self.blocks[b].0;
             let mut targets = vec![0.0; structure.rows()];
@@ -70,8 +71,6 @@ impl Solver {
         };
         let side = &mut self.blocks[b].1.sides[s];
         let targets = std::mem::replace(&mut side.targets, zero);
-        let fresh = fresh_sides(std::slice::from_ref(&self.blocks[b].1)).pop().and_then(|mut s| s.pop());
-        self.sides[b][s] = fresh.unwrap_or_default();
         self.at = (b, s);
         self.converged = true;
         self.stage = Stage::Residual;

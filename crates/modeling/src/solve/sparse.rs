@@ -6,7 +6,7 @@
 use super::cholesky::dot;
 use super::correct::Correct;
 use crate::energy::Operator;
-use crate::system::{Structure, sight};
+use crate::system::Structure;
 use faer::linalg::solvers::Solve;
 use faer::sparse::linalg::solvers::Llt;
 use faer::sparse::{SparseColMat, Triplet};
@@ -58,9 +58,7 @@ fn loose(null: &[Vec<f64>], structure: &Structure, stiffness: &[f64], size: f64)
         for z in null {
             let mut shape = vec![0.0; structure.unknowns()];
             shape[c * structure.n..][..structure.n].copy_from_slice(z);
-            let most = z.iter().fold(0.0, |m: f64, z| m.max(z.abs()));
-            let value = |r: usize| sight(structure.apply_row(r, &shape), structure.size(r, c) * most);
-            let rows = stiffness.iter().enumerate().map(|(r, s)| s.sqrt() * value(r)).collect();
+            let rows = stiffness.iter().zip(structure.sight(c, z)).map(|(s, seen)| s.sqrt() * seen).collect();
             let mut one = Loose { shape, rows, square: 0.0 };
             clear(&mut one, firm.iter());
             if one.square > LOOSE * size * dot(&one.shape, &one.shape) {

@@ -2,7 +2,7 @@
 
 use super::refine::{SideState, Solver};
 use crate::constraint::{Demand, curvature};
-use crate::system::{Block, Problem, Structure, sight};
+use crate::system::{Block, Problem, Structure};
 use std::sync::Arc;
 
 /// A row of length 1 may be missed by this share of the size of the shape, whatever the tolerance.
@@ -99,13 +99,9 @@ impl Solver {
         let null = self.h.null_space(self.problem.energy().free_degree());
         let rounding = allowed(self.settings.tolerance, scale);
         for ((structure, block), states) in self.blocks.iter().zip(&self.sides).filter(|b| soft(&b.0.0)) {
-            let n = structure.n;
             for (c, z) in (0..structure.k).flat_map(|c| null.iter().map(move |z| (c, z))) {
-                let mut shape = vec![0.0; structure.unknowns()];
-                shape[c * n..][..n].copy_from_slice(z);
-                let most = z.iter().fold(0.0, |m: f64, z| m.max(z.abs()));
-                let sees = |r: usize| sight(structure.apply_row(r, &shape), structure.size(r, c) * most);
-                let seen: Vec<f64> = (0..structure.rows()).map(|r| sees(r) / structure.give[r]).collect();
+                let seen = structure.sight(c, z).into_iter().zip(&structure.give);
+                let seen: Vec<f64> = seen.map(|(seen, give)| seen / give).collect();
                 for (side, state) in block.sides.iter().zip(states) {
                     let (mut sum, mut least) = (0.0, 0.0);
                     for (r, by) in seen.iter().enumerate() {

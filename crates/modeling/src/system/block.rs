@@ -3,6 +3,7 @@
 use super::dependence::{Dependence, dependent};
 use super::{Problem, ProblemError};
 use crate::constraint::{Functional, Row};
+use std::collections::BTreeMap;
 
 /// What blocks with the same rows share: everything but the targets.
 #[derive(Clone, Debug)]
@@ -140,6 +141,17 @@ impl Structure {
         own.map(|(_, f, by)| self.functionals[*f].entries().map(|(_, v)| (by * v).abs()).sum::<f64>()).sum()
     }
 
+    /// What each row sees of a shape of no energy in coordinate `c`: a column of `A Z`, see [`sight`].
+    pub(crate) fn sight(&self, c: usize, shape: &[f64]) -> Vec<f64> {
+        let most = shape.iter().fold(0.0, |m: f64, z| m.max(z.abs()));
+        let of = |r: usize| {
+            let own = self.terms[r].iter().filter(|t| t.0 == c);
+            let value: f64 = own.map(|t| t.2 * self.functionals[t.1].apply(shape)).sum();
+            sight(value, self.size(r, c) * most)
+        };
+        (0..self.rows()).map(of).collect()
+    }
+
     /// `y = A x`.
     pub(crate) fn apply(&self, x: &[f64], y: &mut [f64]) {
         for (r, y) in y.iter_mut().enumerate() {
@@ -189,8 +201,10 @@ impl Redundant {
     /// One a constraint, in order of the first row of each, with the worst miss of its coordinates.
     fn by_constraint(rows: Vec<Redundant>) -> Vec<Redundant> {
         let mut out: Vec<Redundant> = Vec::new();
+        let mut places = BTreeMap::new();
         for row in rows {
-            let Some(known) = out.iter_mut().find(|r| r.constraint == row.constraint) else {
+            let place = *places.entry(row.constraint).or_insert(out.len());
+            let Some(known) = out.get_mut(place) else {
                 out.push(row);
                 continue;
             };

@@ -58,8 +58,9 @@ pub(super) struct Left {
     gmres: Box<Gmres<3>>,
     /// Half the difference of the halves in that sweep.
     apart: Vec<[f64; 3]>,
-    /// The residual at which the solve ends.
+    /// The residual at which the solve ends, and the most steps.
     wanted: f64,
+    most: usize,
 }
 
 /// The scatter on its way.
@@ -71,6 +72,8 @@ pub(super) struct Spread {
     pattern: u64,
     /// What the balance left open.
     unsolved: f64,
+    /// Most steps.
+    most: usize,
 }
 
 impl Sampled {
@@ -135,7 +138,8 @@ impl Sampled {
         self.statistics.residual = left;
         if left > self.wanted() && self.corrections < MOST_CORRECTIONS {
             let wanted = (SOLVED * left).max(0.3 * self.wanted());
-            self.phase = Phase::Solving(Left { gmres: Box::new(gmres), apart: sweep.apart, wanted });
+            let most = self.krylov_vectors(RESTART);
+            self.phase = Phase::Solving(Left { gmres: Box::new(gmres), apart: sweep.apart, wanted, most });
             return;
         }
         self.take(sweep.gathered, sweep.apart, left);
@@ -153,8 +157,7 @@ impl Sampled {
     pub(super) fn solve(&mut self, mut left: Left) -> Event {
         let gmres = &mut left.gmres;
         let (now, wanted) = (self.relative(gmres.residual()), left.wanted);
-        let direction =
-            if now <= wanted || gmres.steps() >= self.krylov_vectors(RESTART) { None } else { gmres.direction() };
+        let direction = gmres.direction().filter(|_| now > wanted && gmres.steps() < left.most);
         let Some(direction) = direction else {
             self.corrections += 1;
             self.indirect = gmres.solution();
@@ -229,15 +232,15 @@ impl Sampled {
         let right = self.pass_on(&signed);
         self.statistics.iterations += 1;
         let start = vec![[0.0; 3]; right.len()];
+        let most = self.krylov_vectors(SPREAD_STEPS);
         let gmres = Box::new(Gmres::new(start, right, self.weights()));
-        self.phase = Phase::Spreading(Spread { gmres, apart, passed, pattern, unsolved });
+        self.phase = Phase::Spreading(Spread { gmres, apart, passed, pattern, unsolved, most });
     }
 
     pub(super) fn spread(&mut self, mut spread: Spread) -> Event {
         let size = |v: [f64; 3]| v.iter().sum::<f64>();
         let scatter = size(Gmres::new(spread.apart.clone(), spread.apart.clone(), self.weights()).residual());
-        let open = size(spread.gmres.residual()) > SPREAD_TOLERANCE * scatter
-            && spread.gmres.steps() < self.krylov_vectors(SPREAD_STEPS);
+        let open = size(spread.gmres.residual()) > SPREAD_TOLERANCE * scatter && spread.gmres.steps() < spread.most;
         if let Some(direction) = spread.gmres.direction().filter(|_| open) {
             let product = self.apply(direction);
             spread.gmres.supply(product);

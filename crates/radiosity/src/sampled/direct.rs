@@ -329,9 +329,9 @@ pub(super) fn fit(
         return Fit { coefficients, misfit: zero.clone(), scatter: zero, lit: share, work, known: None };
     }
     // what rays may have failed to find, and the groups to which there are too few to tell shape from scatter
-    let overlooked = lamps.overlooked(crowded, whole, rays * count as f64);
+    let (overlooked, sent) = lamps.overlooked(crowded, whole, rays * count as f64);
     let overlooked: Vec<f32> = overlooked.into_iter().map(|o| o as f32).collect();
-    let sparse: Vec<bool> = lamps.rays_to_groups(crowded, 0.5 * rays).iter().map(|r| *r > 0.0 && *r < 1.0).collect();
+    let sparse: Vec<bool> = sent.iter().map(|r| *r > 0.0 && *r < 2.0 * count as f64).collect();
     if values.iter().all(|v| *v == [0.0; 2]) {
         // in shadow, but for what may stick out of it between the points and the rim
         let (rim, once_more) = (corners(cell.shape), once_more());

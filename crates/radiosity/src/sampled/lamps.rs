@@ -270,24 +270,18 @@ impl Lamps {
     /// What may be missed of each group, for unit exitance, where rays to lamps behind many things met nothing: a root
     /// mean square. Half of such lamps are taken to be hidden altogether, and of the others any part to be seen; after
     /// N rays that failed the square of the visible part is on average 2 / ((N + 2)^2 (N + 3)). `rays` go to all lamps
-    /// together, which without anything between would bring `whole`.
-    pub(super) fn overlooked(&self, crowded: &[Crowded], whole: f64, rays: f64) -> Vec<f64> {
-        let mut squares = vec![0.0; self.groups.len()];
+    /// together, which without anything between would bring `whole`. Beside it how many of them go to each group.
+    pub(super) fn overlooked(&self, crowded: &[Crowded], whole: f64, rays: f64) -> (Vec<f64>, Vec<f64>) {
+        let (mut squares, mut sent) = (vec![0.0; self.groups.len()], vec![0.0; self.groups.len()]);
         for &(k, share) in crowded {
             let lamp = &self.lamps[k as usize];
             let (share, power) = (f64::from(share), lamp.power);
             let failed = rays * share;
             let part = 2.0 / ((failed + 2.0).powi(2) * (failed + 3.0));
             squares[lamp.group] += (share * whole / power).powi(2) * part;
+            sent[lamp.group] += failed;
         }
-        squares.into_iter().map(f64::sqrt).collect()
-    }
-
-    /// Rays of a point to each group, of `rays` to all lamps together.
-    pub(super) fn rays_to_groups(&self, crowded: &[Crowded], rays: f64) -> Vec<f64> {
-        let mut out = vec![0.0; self.groups.len()];
-        crowded.iter().for_each(|&(k, share)| out[self.lamps[k as usize].group] += rays * f64::from(share));
-        out
+        (squares.into_iter().map(f64::sqrt).collect(), sent)
     }
 
     /// Adds to `out[group]` the irradiance that lamps which are cut out exactly bring to a point of a side with a

@@ -3,7 +3,7 @@
 //! B-splines sum to one, and constants cost nothing, so the shape is the same; but rounding grows with the square of
 //! the heights, and drowns the energy of what is left of them.
 
-use crate::system::{Block, sight};
+use crate::system::Block;
 
 /// Common heights this many times as large as what is left of them are taken off.
 const FAR: f64 = 4.0;
@@ -16,15 +16,9 @@ pub(super) fn take_off(blocks: &mut [Block], coordinates: usize) -> Vec<f64> {
     let mut means = vec![0.0; coordinates];
     for block in blocks {
         let structure = &block.structure;
-        let n = structure.n;
-        // What each row makes of a coordinate of ones.
-        let sees = |r: usize, c: usize| {
-            let (columns, values) = structure.row(r);
-            let own = columns.iter().zip(values).filter(|e| *e.0 as usize / n == c);
-            sight(own.map(|e| e.1).sum(), structure.size(r, c))
-        };
+        let ones = vec![1.0; structure.n];
         for c in 0..structure.k {
-            let seen: Vec<f64> = (0..structure.rows()).map(|r| sees(r, c)).collect();
+            let seen = structure.sight(c, &ones);
             let square: f64 = seen.iter().map(|y| y * y).sum();
             for side in block.sides.iter_mut().filter(|_| square > 0.0) {
                 let pairs = || seen.iter().zip(&side.targets).filter(|e| *e.0 != 0.0);
