@@ -266,10 +266,18 @@ impl Sampled {
 
     /// What all this says of each element: the field that is shown, and its scatter.
     fn settle(&mut self, apart: &[[f64; 3]], passed: &[[f64; 3]]) {
-        let stride = self.forest.stride();
         let noise = |k: usize| self.verdicts[k].noise.hypot(self.verdicts[k].misfit.max(0.0).sqrt());
         let fields: [&[[f64; 3]]; 2] = [&self.indirect, apart];
-        let [smooth, apart] = stitch::stitched(&self.forest, (&self.gathers, &self.slots), fields, noise);
+        let values = std::mem::take(&mut self.scratch.values);
+        let mut irradiance = self.direct_light(values);
+        let mut scatter = Vec::with_capacity(self.gathers.len());
+        let gathers = (&self.gathers[..], &self.slots);
+        stitch::stitched(&self.forest, gathers, fields, noise, |k, functions, [smooth, apart]| {
+            let node = self.gathers[k].node;
+            self.add_at(node, functions, smooth, &mut irradiance);
+            scatter.push(gather::size_of(self.forest.basis_of(node), apart));
+        });
+        self.push_to_leaves(&mut irradiance);
         // elements that met nothing bright may just have missed it: they are as uncertain as others were at first
         let (mut area, mut square) = (0.0, 0.0);
         for (gather, verdict) in self.gathers.iter().zip(&self.verdicts) {
@@ -280,18 +288,10 @@ impl Sampled {
         let usual = if area > 0.0 { square / area } else { 0.0 };
         for (k, verdict) in self.verdicts.iter_mut().enumerate() {
             let basis = self.forest.basis_of(self.gathers[k].node);
-            let own = gather::size_of(basis, &apart[k * stride..][..basis.len()]);
             let passed = gather::size_of(basis, &passed[self.slots.range(k)]);
-            *verdict = Verdict { scatter: own.hypot(passed), ..*verdict };
+            *verdict = Verdict { scatter: scatter[k].hypot(passed), ..*verdict };
             verdict.doubt(usual, f64::from(self.gathers[k].drawn));
         }
-        let values = std::mem::take(&mut self.scratch.values);
-        let mut irradiance = self.direct_light(values);
-        let functions = |k: usize| {
-            let basis = self.forest.basis_of(self.gathers[k].node);
-            basis.truncated(basis.order())
-        };
-        self.add_gathered(|k| (functions(k), &smooth[k * stride..]), &mut irradiance);
         positive::keep_positive(&self.forest, &mut irradiance);
         self.scratch.values = std::mem::replace(&mut self.irradiance, irradiance);
     }

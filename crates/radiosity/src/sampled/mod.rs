@@ -458,20 +458,23 @@ impl Sampled {
 
     /// Adds gathered light, pushed to the leaves, to `values`.
     fn add_indirect(&self, indirect: &[[f64; 3]], values: &mut [[f64; 3]]) {
-        let own = |k: usize| (self.gathers[k].functions(&self.forest), &indirect[self.slots.range(k)]);
-        self.add_gathered(own, values);
+        for (k, gather) in self.gathers.iter().enumerate() {
+            self.add_at(gather.node, gather.functions(&self.forest), &indirect[self.slots.range(k)], values);
+        }
+        self.push_to_leaves(values);
     }
 
-    /// The same for functions of each gathering element and their coefficients.
-    fn add_gathered<'a>(&'a self, own: impl Fn(usize) -> (&'a [u16], &'a [[f64; 3]]), values: &mut [[f64; 3]]) {
-        let stride = self.forest.stride();
-        for (k, gather) in self.gathers.iter().enumerate() {
-            let (functions, coefficients) = own(k);
-            for (&i, from) in functions.iter().zip(coefficients) {
-                let to = &mut values[gather.node.index() * stride + usize::from(i)];
-                (0..3).for_each(|c| to[c] += from[c]);
-            }
+    /// Adds coefficients of functions of a node.
+    fn add_at(&self, node: NodeId, functions: &[u16], coefficients: &[[f64; 3]], values: &mut [[f64; 3]]) {
+        for (&i, from) in functions.iter().zip(coefficients) {
+            let to = &mut values[node.index() * self.forest.stride() + usize::from(i)];
+            (0..3).for_each(|c| to[c] += from[c]);
         }
+    }
+
+    /// Moves coefficients at all nodes to the leaves.
+    fn push_to_leaves(&self, values: &mut [[f64; 3]]) {
+        let stride = self.forest.stride();
         transport::push(&self.forest, values);
         for (n, node) in self.forest.nodes().iter().enumerate() {
             if node.first_child != 0 {

@@ -20,31 +20,21 @@ const ALIKE: f64 = 3.0;
 /// Values of a field and of half the difference of its halves, by channel.
 type Values = [[f64; 3]; 2];
 
-/// The same field with its corners averaged: coefficients of all functions in the order of `gathers`; and half the
-/// difference of its halves, treated alike. Parallelograms with bases of the second order only; others, and elements
-/// partly inside of something, are left as they are.
+/// Visits every gathering element with some of its functions and their coefficients in the same field with its corners
+/// averaged; and in half the difference of its halves, treated alike. Parallelograms with bases of the second order
+/// only; others, and elements partly inside of something, are left as they are.
 pub(super) fn stitched(
     forest: &Forest,
     (gathers, slots): (&[Gather], &Slots),
     fields: [&[[f64; 3]]; 2],
     noise: impl Fn(usize) -> f64,
-) -> [Vec<[f64; 3]>; 2] {
+    mut visit: impl FnMut(usize, &[u16], [&[[f64; 3]]; 2]),
+) {
     let whole = |gather: &Gather| gather.is_whole();
-    let stride = forest.stride();
     let mut of_node = vec![u32::MAX; forest.len()];
     gathers.iter().enumerate().for_each(|(k, gather)| of_node[gather.node.index()] = k as u32);
     let basis = forest.basis(CellShape::Square);
-    let mut out = fields.map(|field| {
-        let mut full = vec![[0.0; 3]; gathers.len() * stride];
-        for (k, gather) in gathers.iter().enumerate() {
-            let own = gather.functions(forest).iter().zip(&field[slots.range(k)]);
-            own.for_each(|(&i, v)| full[k * stride + usize::from(i)] = *v);
-        }
-        full
-    });
-    if !basis.is_nested() || basis.order() != 2 {
-        return out;
-    }
+    let is_bilinear = basis.is_nested() && basis.order() == 2;
     // the gather over a point of a side, and the value of its function there
     let value = |side: u32, at: [f64; 2]| -> Option<(usize, Values)> {
         let mut id = forest.roots()[side as usize];
@@ -70,7 +60,8 @@ pub(super) fn stitched(
     let analysis = basis.analysis(2);
     for (k, gather) in gathers.iter().enumerate() {
         let cell = &forest.node(NodeId(gather.node.0)).cell;
-        if cell.shape != CellShape::Square || !whole(gather) {
+        if cell.shape != CellShape::Square || !whole(gather) || !is_bilinear {
+            visit(k, gather.functions(forest), fields.map(|field| &field[slots.range(k)]));
             continue;
         }
         let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]].map(|corner| {
@@ -102,13 +93,13 @@ pub(super) fn stitched(
             };
             analysis.points.iter().map(bilinear).collect()
         };
+        let mut out = [[[0.0; 3]; MOST]; 2];
         for (f, out) in out.iter_mut().enumerate() {
             for c in 0..3 {
-                for (slot, v) in analysis.coefficients(&samples(f, c)).into_iter().enumerate() {
-                    out[k * stride + slot][c] = v;
-                }
+                let own = analysis.coefficients(&samples(f, c)).into_iter().zip(&mut *out);
+                own.for_each(|(v, out)| out[c] = v);
             }
         }
+        visit(k, basis.truncated(basis.order()), [&out[0][..basis.len()], &out[1][..basis.len()]]);
     }
-    out
 }
