@@ -9,7 +9,7 @@
 //! solving for the scatter, with signs drawn at random for the elements, a few times over.
 
 use super::field::{self, Field, Form};
-use super::gather;
+use super::gather::{self, Gather};
 use super::plan::UNSOLVED;
 use super::verdict::Verdict;
 use super::{Phase, RAYS_A_STEP, Sampled, Scratch, positive, stitch};
@@ -38,6 +38,8 @@ const SPREAD_STEPS: usize = 12;
 /// What a sweep left over is solved to this share of it: the next sweep says what the first samples got wrong, which
 /// is more.
 const SOLVED: f64 = 0.1;
+/// A correction that leaves more than this share of what was left over does not help.
+const HELPFUL: f64 = 0.5;
 /// What is left over reaches this many times as much as direct light does, where that is less than the worst case of
 /// the brightest material everywhere.
 const AMPLIFIED: f64 = 3.0;
@@ -106,9 +108,7 @@ impl Sampled {
         let judged = par::map(count, |k| {
             let width = gathers[k].functions(&self.forest).len();
             let (mut out, mut apart) = (vec![[0.0; 3]; width], vec![[0.0; 3]; width]);
-            let drawn_again = gathers[k]
-                .missing((sweep.done + k) as u32)
-                .map(|draw| gathers[k].completed(gather::cast(&self.kernel, &self.forest, &gathers[k], &draw)));
+            let drawn_again = self.complete(sweep.done + k);
             let verdict = drawn_again.as_ref().unwrap_or(&gathers[k]).judge(&field, &mut out, &mut apart);
             (verdict, out, apart)
         });
@@ -128,14 +128,27 @@ impl Sampled {
         event
     }
 
+    /// A gathering element with all its samples, if some are not stored: these are drawn again.
+    fn complete(&self, k: usize) -> Option<Gather> {
+        let gather = &self.gathers[k];
+        let draw = gather.missing(k as u32)?;
+        Some(gather.completed(gather::cast(&self.kernel, &self.forest, gather, &draw)))
+    }
+
     /// Solves for what a sweep left over, or goes on if that is little.
     fn correct(&mut self, sweep: Sweep) {
         self.scratch = Scratch { values: sweep.radiosity, forms: sweep.forms };
+        if self.whole <= 0.0 {
+            // lamps that are known may bring nothing
+            self.whole = self.integral_of_direct() + self.integral_of_gathered(&sweep.gathered);
+        }
         let pairs = sweep.gathered.iter().zip(&self.indirect);
         let residual = pairs.map(|(g, i)| std::array::from_fn(|c| g[c] - i[c])).collect();
         let gmres = Gmres::new(self.indirect.clone(), residual, self.weights());
         let left = self.relative(gmres.residual());
-        self.statistics.residual = left;
+        // the first samples may miss what matters, such as the one bright spot among them
+        self.thorough |= self.corrections > 0 && left > HELPFUL * self.left;
+        self.left = left;
         if left > self.wanted() && self.corrections < MOST_CORRECTIONS {
             let wanted = (SOLVED * left).max(0.3 * self.wanted());
             let most = self.krylov_vectors(RESTART);
@@ -149,6 +162,7 @@ impl Sampled {
     /// amplification.
     fn take(&mut self, gathered: Vec<[f64; 3]>, apart: Vec<[f64; 3]>, left: f64) {
         self.corrections = 0;
+        self.statistics.residual = left;
         self.indirect = gathered;
         let passed = vec![[0.0; 3]; self.indirect.len()];
         self.start_spreading(apart, passed, 0, left * self.amplification);
@@ -174,7 +188,7 @@ impl Sampled {
             let passed: Vec<[f64; 3]> = passed.collect();
             let passed = Gmres::new(passed.clone(), passed, self.weights()).residual();
             let lacking = self.relative(std::array::from_fn(|c| lengths[c] * passed[c]));
-            if lacking <= self.wanted() {
+            if lacking <= self.wanted() && self.corrections > 0 {
                 let gathered = self.indirect.iter().zip(direction);
                 let gathered = gathered.map(|(i, x)| std::array::from_fn(|c| i[c] + lengths[c] * x[c])).collect();
                 self.take(gathered, left.apart, lacking);
@@ -196,7 +210,7 @@ impl Sampled {
         product
     }
 
-    /// K r x with the first samples.
+    /// K r x with the first samples, or with all where these do not help.
     fn pass_on(&mut self, x: &[[f64; 3]]) -> Vec<[f64; 3]> {
         let Scratch { mut values, mut forms } = std::mem::take(&mut self.scratch);
         values.clear();
@@ -207,12 +221,16 @@ impl Sampled {
         let field = Field::new(&self.forest, &values, &forms);
         let mut out = vec![[0.0; 3]; self.slots.len()];
         par::for_each(self.slots.chunks(GATHERS_A_TASK, &mut out), |(first, mut rest)| {
-            for gather in &self.gathers[first..] {
+            for (k, gather) in (first..).zip(&self.gathers[first..]) {
                 let (own, others) = rest.split_at_mut(gather.functions(&self.forest).len().min(rest.len()));
                 if own.is_empty() {
                     break;
                 }
-                gather.gather(&field, own);
+                if self.thorough {
+                    self.complete(k).as_ref().unwrap_or(gather).gather(&field, true, own);
+                } else {
+                    gather.gather(&field, false, own);
+                }
                 rest = others;
             }
         });
@@ -321,8 +339,7 @@ impl Sampled {
 
     /// Residual relative to the whole irradiance.
     fn relative(&self, residual: [f64; 3]) -> f64 {
-        let whole = if self.whole > 0.0 { self.whole } else { self.integral_of_direct() };
         let r = residual.iter().sum::<f64>() * self.counted_area.sqrt();
-        if whole > 0.0 { r / whole } else { 0.0 }
+        if self.whole > 0.0 { r / self.whole } else { 0.0 }
     }
 }

@@ -321,12 +321,12 @@ impl Gather {
         }
     }
 
-    /// What the first samples gather, as coefficients.
-    pub(super) fn gather(&self, radiosity: &Field<'_>, out: &mut [[f64; 3]]) {
+    /// What the first samples gather, or all, as coefficients.
+    pub(super) fn gather(&self, radiosity: &Field<'_>, all: bool, out: &mut [[f64; 3]]) {
         let mut values = [[0.0; 3]; Gather::MOST_POINTS];
         let values = &mut values[..self.points.len()];
         for half in 0..2 {
-            self.values(radiosity, half, false, values);
+            self.values(radiosity, half, all, values);
             self.add_fit(values, 0.5, out);
         }
     }

@@ -235,7 +235,8 @@ impl Sampled {
             self.step();
         }
         self.counted_area = counted_area(&self.scene, &self.kernel);
-        (self.aim, self.rounds, self.corrections) = (plan::AIM, 0, 0);
+        (self.aim, self.rounds, self.corrections, self.thorough) = (plan::AIM, 0, 0, false);
+        self.full = false;
         (self.refitted, self.stalled, self.error, self.whole) = (false, false, f64::INFINITY, 0.0);
         // the samples may be as good as they need be: nothing more is left over by the balance
         self.precision = plan::FINELY * self.settings.error;

@@ -5,12 +5,13 @@
 //! sweep; a sweep of all samples costs their rays then, and finds the same. Fits of direct light begin anew under a
 //! cap, with other rays: another answer that keeps the same promise.
 
+use super::Sampled;
 use super::direct::Known;
 use super::field::Form;
 use super::gather::{Draw, Gather};
+use super::points::Point;
 use super::rays::Ray;
 use super::verdict::Verdict;
-use super::{FIRST_DIRECTIONS, Phase, Sampled};
 use crate::solver::SolveError;
 use ondelette_compress::forest::Node;
 
@@ -22,6 +23,8 @@ const LEAST_KRYLOV: usize = 4;
 const WORKING_VECTORS: u64 = 8 + LEAST_KRYLOV as u64;
 /// What the allocator adds to each of the arrays of a gathering element.
 const BESIDE_AN_ARRAY: usize = 16;
+/// What a gathering element takes beside its arrays.
+const BESIDE_A_GATHER: usize = size_of::<Gather>() + size_of::<Verdict>() + size_of::<u32>();
 /// Share of what is allowed that is counted on: between arrays that grow, some is lost.
 const COUNTED: f64 = 0.95;
 
@@ -40,21 +43,66 @@ impl Sampled {
 
     /// Bytes of elements, points and samples, and of the arrays that a sweep works in.
     pub(crate) fn bytes(&self) -> u64 {
-        let (groups, stride) = (self.lamps.groups.len(), self.forest.stride());
-        let node = size_of::<Node>()
-            + groups * (stride + 2) * size_of::<f32>()
-            + size_of::<[f32; 2]>()
-            + LEAF_ARRAYS * stride * size_of::<[f64; 3]>()
-            + size_of::<Form>();
-        let beside = size_of::<Gather>() + size_of::<Verdict>() + size_of::<u32>();
         let gather = |g: &Gather| {
             let (bytes, arrays) = g.bytes();
-            beside + bytes + arrays * BESIDE_AN_ARRAY
+            BESIDE_A_GATHER + bytes + arrays * BESIDE_AN_ARRAY
         };
         let gathers: usize = self.gathers.iter().map(gather).sum();
         let known: usize = self.known.iter().flatten().map(Known::bytes).sum();
         let known = known + size_of_val(&self.known[..]);
-        (self.forest.len() * node + known + gathers) as u64 + WORKING_VECTORS * self.bytes_a_vector()
+        let nodes = self.forest.len() as u64 * self.bytes_a_node();
+        nodes + (known + gathers) as u64 + WORKING_VECTORS * self.bytes_a_vector()
+    }
+
+    /// Bytes of a node's light.
+    pub(super) fn bytes_a_node(&self) -> u64 {
+        let (groups, stride) = (self.lamps.groups.len(), self.forest.stride());
+        let bytes = size_of::<Node>()
+            + groups * (stride + 2) * size_of::<f32>()
+            + size_of::<[f32; 2]>()
+            + LEAF_ARRAYS * stride * size_of::<[f64; 3]>()
+            + size_of::<Form>();
+        bytes as u64
+    }
+
+    /// Bytes that so many new points take beside those of a gathering element, with their first samples, and of the
+    /// functions that may come with them.
+    pub(super) fn bytes_of_points(&self, k: usize, points: u64) -> u64 {
+        let gather = &self.gathers[k];
+        let basis = self.forest.basis_of(gather.node);
+        let functions = basis.len() as u64;
+        let samples = 2 * u64::from(Gather::FIRST.min(gather.drawn)) * size_of::<Ray>() as u64;
+        let fit = functions * size_of::<f64>() as u64;
+        let all = points + u64::from(gather.points());
+        let vectors = WORKING_VECTORS * functions * size_of::<[f64; 3]>() as u64;
+        points * (size_of::<Point>() as u64 + samples) + all * fit + vectors + 3 * BESIDE_AN_ARRAY as u64
+    }
+
+    /// Bytes that a split of a gathering element into so many children takes, likewise; each has four new points.
+    pub(super) fn bytes_of_children(&self, k: usize, children: usize) -> u64 {
+        let one = self.bytes_a_node() + BESIDE_A_GATHER as u64 + self.bytes_of_points(k, 4);
+        children as u64 * one
+    }
+
+    /// How many of these costs a share of the room that is left pays for. Samples other than the first give way first;
+    /// if that is not enough, memory is full.
+    pub(super) fn affordable(&mut self, costs: Vec<u64>, share: f64) -> usize {
+        let Some(cap) = self.cap else { return costs.len() };
+        let total: u64 = costs.iter().sum();
+        if self.bytes() + total > cap {
+            self.stream();
+        }
+        let room = (share * cap.saturating_sub(self.bytes()) as f64) as u64;
+        if total <= room {
+            return costs.len();
+        }
+        self.full = true;
+        let mut sum = 0;
+        let fits = |cost: &&u64| {
+            sum += **cost;
+            sum <= room
+        };
+        costs.iter().take_while(fits).count()
     }
 
     /// Bytes of one number a function in use of the gathering elements, and channel.
@@ -77,7 +125,7 @@ impl Sampled {
     /// Bytes of the first samples of all points, drawn or not.
     fn first_bytes(&self) -> u64 {
         let points: u64 = self.gathers.iter().map(|g| u64::from(g.points())).sum();
-        points * 2 * u64::from(FIRST_DIRECTIONS) * size_of::<Ray>() as u64
+        points * 2 * u64::from(Gather::FIRST) * size_of::<Ray>() as u64
     }
 
     /// Looks whether planned samples fit; if not, no more than the first of every element are stored from now on.
@@ -89,17 +137,16 @@ impl Sampled {
         if now + more <= cap {
             return false;
         }
-        if !self.streaming {
-            self.streaming = true;
-            self.gathers.iter_mut().for_each(Gather::forget_others);
-        }
+        self.stream();
         let early: u64 = draws.iter().map(|d| (d.early().rays() * size_of::<Ray>()) as u64).sum();
         self.bytes() + early > cap
     }
 
-    /// Ends where it is: the cap leaves no room for more.
-    pub(super) fn stop_for_memory(&mut self) {
-        self.stalled = true;
-        self.phase = Phase::Finished;
+    /// From now on no more than the first samples are stored.
+    fn stream(&mut self) {
+        if !self.streaming {
+            self.streaming = true;
+            self.gathers.iter_mut().for_each(Gather::forget_others);
+        }
     }
 }

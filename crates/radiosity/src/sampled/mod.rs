@@ -14,6 +14,7 @@ mod direct;
 mod exact;
 mod field;
 mod gather;
+mod grow;
 mod kept;
 mod lamps;
 mod memory;
@@ -123,8 +124,10 @@ pub(crate) struct Sampled {
     streaming: bool,
     /// How much more of a residual there is once it was reflected as often as it can be.
     amplification: f64,
-    /// Solves of the present samples so far.
+    /// Solves of the present samples so far, what they left over, and whether they are to be with all samples.
     corrections: u32,
+    left: f64,
+    thorough: bool,
     /// What share of the promise batches aim at.
     aim: f64,
     /// How much more all errors together are than the root of the sum of their squares.
@@ -135,6 +138,8 @@ pub(crate) struct Sampled {
     /// Whether direct light changed since the last balance.
     refitted: bool,
     stalled: bool,
+    /// Whether memory had no room for all that was wanted: what there is is balanced, and that is all.
+    full: bool,
     /// Estimated integral of the error over each side, channels summed.
     missed: Vec<f64>,
     error: f64,
@@ -230,12 +235,15 @@ impl Sampled {
             streaming: false,
             amplification: 1.0,
             corrections: 0,
+            left: 0.0,
+            thorough: false,
             aim: plan::AIM,
             overlap: 1.0,
             work: [0.0; 2],
             rounds: 0,
             refitted: false,
             stalled: false,
+            full: false,
             missed: Vec::new(),
             error: f64::INFINITY,
             precision: settings.error.max(FIRST_PRECISION),
@@ -332,43 +340,6 @@ impl Sampled {
             self.phase = Phase::Casting { draws, done: 0 };
         }
         event
-    }
-
-    /// Splits leaves: children take over what is known, and are to be fitted.
-    fn split(&mut self, leaves: &[NodeId]) -> Vec<NodeId> {
-        let (groups, stride) = (self.lamps.groups.len(), self.forest.stride());
-        // not a byte more than is counted
-        let more: usize = leaves.iter().map(|&id| self.forest.node(id).cell.shape.arity()).sum();
-        self.forest.reserve(more);
-        self.irradiance.reserve_exact(more * stride);
-        self.direct.reserve_exact(more * groups * stride);
-        [&mut self.misfit, &mut self.scatter].into_iter().for_each(|v| v.reserve_exact(more * groups));
-        [&mut self.lit, &mut self.rays].into_iter().for_each(|v| v.reserve_exact(more));
-        let mut fresh = Vec::with_capacity(more);
-        for &id in leaves {
-            self.forest.split(id);
-            if let Some(known) = self.known.get_mut(id.index()) {
-                *known = None;
-            }
-            let arity = self.forest.node(id).cell.shape.arity();
-            fresh.extend((0..arity).map(|c| self.forest.child(id, c)));
-            self.irradiance.resize(self.forest.len() * stride, [0.0; 3]);
-            transport::push_node(&self.forest, id, &mut self.irradiance);
-            self.irradiance[id.index() * stride..(id.index() + 1) * stride].fill([0.0; 3]);
-        }
-        self.direct.resize(self.forest.len() * groups * stride, 0.0);
-        self.misfit.resize(self.forest.len() * groups, 0.0);
-        self.scatter.resize(self.forest.len() * groups, 0.0);
-        self.lit.resize(self.forest.len(), 1.0);
-        if self.cap.is_none() {
-            self.known.resize(self.forest.len(), None);
-        }
-        // smaller elements need fewer rays
-        for &id in &fresh {
-            let parent = self.rays[self.forest.node(id).parent.index()];
-            self.rays.push((0.5 * parent).max(LEAST_LAMP_RAYS));
-        }
-        fresh
     }
 
     // ---- samples
@@ -515,6 +486,23 @@ impl Sampled {
                 let own = &values[n * stride..n * stride + basis.len()];
                 let mean = basis.mean(own, [0.0; 3], |a, b, k| (Rgb(a) + Rgb(b) * k).0);
                 sum += node.measure * f64::from(self.lit[n]) * mean.iter().sum::<f64>();
+            }
+        }
+        sum
+    }
+
+    /// That of gathered light.
+    fn integral_of_gathered(&self, gathered: &[[f64; 3]]) -> f64 {
+        let mut sum = 0.0;
+        for (k, gather) in self.gathers.iter().enumerate() {
+            let node = self.forest.node(gather.node);
+            if self.counts(node.cell.root) {
+                let basis = self.forest.basis_of(gather.node);
+                let mut all = [[0.0; 3]; gather::MOST];
+                let own = gather.functions(&self.forest).iter().zip(&gathered[self.slots.range(k)]);
+                own.for_each(|(&i, v)| all[usize::from(i)] = *v);
+                let mean = basis.mean(&all[..basis.len()], [0.0; 3], |a, b, k| (Rgb(a) + Rgb(b) * k).0);
+                sum += node.measure * mean.iter().sum::<f64>();
             }
         }
         sum

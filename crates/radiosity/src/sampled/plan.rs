@@ -4,10 +4,8 @@
 //! (half the difference of two independent halves), and what the functions of the gathering elements cannot say (the
 //! product of both halves' misses, which is free of scatter on average).
 
-use super::gather::{Draw, Gather, MOST};
+use super::gather::{Draw, Gather};
 use super::shares::{Kind, shares, turning_point};
-use super::slots::Slots;
-use super::verdict::Verdict;
 use super::{FIRST_PRECISION, Phase, Sampled};
 use crate::solver::Event;
 use ondelette_compress::NodeId;
@@ -38,9 +36,7 @@ pub(super) const MOST_DIRECTIONS: f64 = 65_536.0;
 /// Most growth of an element's directions in a round.
 const GROWTH: f64 = 32.0;
 /// Mean absolute value of a misfit over its root mean square.
-const MEAN_OF_MISFIT: f64 = 0.8;
-/// A misfit below this share of what is allowed is not worth a split.
-const WORTHY: f64 = 1.0 / 400.0;
+pub(super) const MEAN_OF_MISFIT: f64 = 0.8;
 /// Mean root of the positive part of a scattered number of mean 0, over the root of its standard deviation.
 pub(super) const FLOOR: f64 = 0.4;
 /// A misfit larger than this many of its standard deviations is one.
@@ -48,8 +44,10 @@ const SIGNIFICANT: f64 = 1.5;
 /// Most rays of a point to the lamps where they scatter, and the factor of them below which more are not worth it.
 pub(super) const MOST_LAMP_RAYS: f64 = 16_384.0;
 const ENOUGH_LAMP_RAYS: f64 = 1.2;
+/// Share of the room in memory that is left which direct light may take.
+const DIRECT_SHARE: f64 = 0.75;
 /// Deepest split.
-const DEEPEST: u32 = 16;
+pub(super) const DEEPEST: u32 = 16;
 /// Rounds after which every round aims lower by as much as is missing, within these limits.
 const PATIENT_ROUNDS: u32 = 3;
 const LOWER: [f64; 2] = [0.65, 0.95];
@@ -79,7 +77,7 @@ impl Sampled {
         let event = Event::Solved { error: self.error, links: 0, elements: self.forest.leaves() };
         if self.error <= self.settings.error {
             self.phase = Phase::Finished;
-        } else if self.rounds >= MOST_ROUNDS {
+        } else if self.rounds >= MOST_ROUNDS || self.full {
             self.stalled = true;
             self.phase = Phase::Finished;
         } else {
@@ -127,7 +125,7 @@ impl Sampled {
 
     /// Integral of what the gathering elements' functions cannot say: roots of estimated squares, less what scatter
     /// alone would make of them, and at least those that scatter would hardly make.
-    fn misfit_of_gathers(&self) -> f64 {
+    pub(super) fn misfit_of_gathers(&self) -> f64 {
         let (mut sum, mut sure) = (0.0, 0.0);
         for (gather, verdict) in self.gathers.iter().zip(&self.verdicts) {
             let node = self.forest.node(gather.node);
@@ -178,12 +176,10 @@ impl Sampled {
         self.whole = self.integral_of_direct() + self.reflected;
         loop {
             let aim = self.aim * self.settings.error * self.whole / (SAFETY * self.overlap);
-            let [direct, lamps, scatter, misfit] = shares(self.kinds(), aim);
-            let leaves = self.worst_leaves(direct);
+            let kinds = self.kinds();
+            let [direct, lamps, scatter, misfit] = shares(kinds, aim);
+            let leaves = if self.full { Vec::new() } else { self.worst_leaves(direct) };
             if !leaves.is_empty() {
-                if self.make_room(&[]) {
-                    return self.stop_for_memory();
-                }
                 let nodes = self.split(&leaves);
                 self.phase = Phase::Fitting { nodes, done: 0, draws: Vec::new() };
                 return;
@@ -193,13 +189,10 @@ impl Sampled {
                 self.phase = Phase::Fitting { nodes, done: 0, draws: Vec::new() };
                 return;
             }
-            // children need direct light as well
-            let (nodes, mut draws) = self.split_gathers(misfit);
-            draws.extend(self.draws(scatter));
-            if self.make_room(&draws) {
-                return self.stop_for_memory();
-            }
+            let stuck = kinds[..2].iter().any(|k| k.error > aim);
+            let (nodes, draws) = if stuck { Default::default() } else { self.more_samples(misfit, scatter) };
             if !draws.is_empty() {
+                // children need direct light as well
                 self.phase = Phase::Fitting { nodes, done: 0, draws };
                 return;
             }
@@ -210,7 +203,7 @@ impl Sampled {
             }
             // every part is within its share, and yet the sum is not
             self.aim *= 0.93;
-            if self.aim < 0.05 {
+            if self.aim < 0.05 || self.full || stuck {
                 self.stalled = true;
                 self.phase = Phase::Finished;
                 return;
@@ -218,8 +211,20 @@ impl Sampled {
         }
     }
 
+    /// Splits gathering elements, and plans samples: new leaves, and what is to be drawn.
+    fn more_samples(&mut self, misfit: f64, scatter: f64) -> (Vec<NodeId>, Vec<Draw>) {
+        let (nodes, mut draws) = self.split_gathers(misfit);
+        let more = self.draws(scatter);
+        draws.extend_from_slice(&more);
+        if self.make_room(&draws) {
+            self.full = true;
+            draws.truncate(draws.len() - more.len());
+        }
+        (nodes, draws)
+    }
+
     /// The leaves whose direct light misses most, as many as bring the sum down to `target`.
-    fn worst_leaves(&self, target: f64) -> Vec<NodeId> {
+    fn worst_leaves(&mut self, target: f64) -> Vec<NodeId> {
         let mut worst: Vec<(f64, u32)> = Vec::new();
         let mut total = 0.0;
         for (n, node) in self.forest.nodes().iter().enumerate() {
@@ -242,6 +247,10 @@ impl Sampled {
             more
         });
         let mut leaves: Vec<NodeId> = enough.map(|w| NodeId(w.1)).collect();
+        // the rest of the room is for what gathers
+        let cost = |id: &NodeId| self.forest.node(*id).cell.shape.arity() as u64 * self.bytes_a_node();
+        let costs = leaves.iter().map(cost).collect();
+        leaves.truncate(self.affordable(costs, DIRECT_SHARE));
         leaves.sort_unstable();
         leaves
     }
@@ -287,97 +296,6 @@ impl Sampled {
             self.rays[n] = rays as f32;
         }
         more.into_iter().map(|(n, _)| NodeId(n as u32)).collect()
-    }
-
-    /// Splits the gathering elements that their functions do not fit; returns new leaves to be fitted, and what is to
-    /// be drawn at new points.
-    fn split_gathers(&mut self, target: f64) -> (Vec<NodeId>, Vec<Draw>) {
-        let mut worst: Vec<(f64, usize)> = Vec::new();
-        let total = self.misfit_of_gathers();
-        for (k, (gather, verdict)) in self.gathers.iter().zip(&self.verdicts).enumerate() {
-            let node = self.forest.node(gather.node);
-            if self.counts(node.cell.root) {
-                let missed = node.measure * MEAN_OF_MISFIT * verdict.misfit.max(0.0).sqrt();
-                // what scatter alone may pretend is left alone
-                let has_room = node.cell.depth < DEEPEST && gather.points() as usize + 4 <= Gather::MOST_POINTS;
-                if verdict.misfit > SIGNIFICANT * verdict.certainty && has_room {
-                    worst.push((missed, k));
-                }
-            }
-        }
-        if total <= target {
-            return Default::default();
-        }
-        worst.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        let mut rest = 1.3 * (total - target);
-        let mut chosen: Vec<usize> = Vec::new();
-        for (missed, k) in worst {
-            if rest <= 0.0 || missed < WORTHY * target {
-                break;
-            }
-            rest -= missed;
-            chosen.push(k);
-        }
-        chosen.sort_unstable();
-        let coarse = |k: usize| self.gathers[k].is_coarse(self.forest.basis_of(self.gathers[k].node));
-        let leaves: Vec<NodeId> = chosen
-            .iter()
-            .filter(|k| !coarse(**k))
-            .map(|&k| self.gathers[k].node)
-            .filter(|&id| self.forest.is_leaf(id))
-            .collect();
-        let fresh = self.split(&leaves);
-        let mut gathers: Vec<Gather> = Vec::with_capacity(self.gathers.len() + 3 * chosen.len());
-        let mut indirect = Vec::with_capacity(self.indirect.len());
-        let mut verdicts = Vec::with_capacity(self.verdicts.len());
-        let mut draws = Vec::new();
-        let mut chosen = chosen.into_iter().peekable();
-        for (k, gather) in std::mem::take(&mut self.gathers).into_iter().enumerate() {
-            let own = &self.indirect[self.slots.range(k)];
-            if chosen.next_if(|&c| c == k).is_none() {
-                gathers.push(gather);
-                indirect.extend_from_slice(own);
-                verdicts.push(self.verdicts[k]);
-                continue;
-            }
-            let basis = self.forest.basis_of(gather.node);
-            if gather.is_coarse(basis) {
-                let mut gather = gather;
-                let known = gather.points();
-                gather.add_points(&self.forest, 2);
-                draws.push(Draw {
-                    gather: gathers.len() as u32,
-                    points: known..gather.points(),
-                    directions: 0..gather.drawn,
-                });
-                gathers.push(gather);
-                indirect.extend_from_slice(own);
-                verdicts.push(self.verdicts[k]);
-                continue;
-            }
-            let (gather_points, functions) = (gather.points(), basis.truncated(gather.order));
-            for (c, (mut child, known)) in gather.split(&self.forest).into_iter().enumerate() {
-                child.stick_out(&self.kernel, &self.forest, known);
-                let [mut parent, mut values] = [[[0.0; 3]; MOST]; 2];
-                functions.iter().zip(own).for_each(|(&i, v)| parent[usize::from(i)] = *v);
-                let n = basis.len();
-                basis.push(c, &parent[..n], &mut values[..n], |to: &mut [f64; 3], k, from: [f64; 3]| {
-                    (0..3).for_each(|c| to[c] += k * from[c]);
-                });
-                indirect.extend(functions.iter().map(|&i| values[usize::from(i)]));
-                let points = known..child.points();
-                // fewer points for as many functions
-                let share = self.verdicts[k].share * (f64::from(gather_points) / f64::from(points.end)).sqrt();
-                let share = share.min(1.0);
-                draws.push(Draw { gather: gathers.len() as u32, points, directions: 0..child.drawn });
-                gathers.push(child);
-                let own = &self.verdicts[k];
-                verdicts.push(Verdict { share, scatter: own.scatter * share / own.share, ..*own });
-            }
-        }
-        (self.gathers, self.indirect, self.verdicts) = (gathers, indirect, verdicts);
-        self.slots = Slots::of(&self.forest, &self.gathers);
-        (fresh, draws)
     }
 
     /// The samples that bring the scatter down to `target`, where they do most.
