@@ -250,11 +250,11 @@ impl Lamps {
                 seen.crowded.push((k as u32, share as f32));
                 continue;
             }
-            looks += 1;
             let (a, b) = (polygon.corners(), lamp.polygon.corners());
             if kernel.occluders().hides(a, b, [own, lamp.patch]) {
                 continue;
             }
+            looks += 1;
             let shaft = Shaft::between(a, n, b, lamp.element.normal(), tolerance);
             let patches = kernel.occluders().candidates(&shaft, [own, lamp.patch], MOST_BLOCKERS);
             if patches.len() > MOST_BLOCKERS {
