@@ -174,16 +174,18 @@ pub(super) struct Known {
     crowded: Box<[Crowded]>,
     rays: f64,
     whole: f64,
+    /// How often rays were drawn.
+    batches: u32,
 }
 
 impl Known {
-    fn of(cut: &[f64], found: &[[f64; 2]], points: usize, crowded: &[Crowded], [rays, whole]: [f64; 2]) -> Self {
+    fn of(cut: &[f64], found: &[[f64; 2]], points: usize) -> Self {
         let both = |k: usize| [cut[k] as f32, found[k][0] as f32, found[k][1] as f32];
         let own = |g: usize| (g * points..(g + 1) * points).map(both);
         let groups: Box<[u8]> =
             (0..cut.len() / points).filter(|g| own(*g).any(|v| v != [0.0; 3])).map(|g| g as u8).collect();
         let found = groups.iter().flat_map(|g| own(usize::from(*g))).collect();
-        Known { groups, found, crowded: crowded.into(), rays, whole }
+        Known { groups, found, crowded: Box::default(), rays: 0.0, whole: 0.0, batches: 0 }
     }
 
     /// What was cut out and found, of so many groups and points.
@@ -247,7 +249,9 @@ pub(super) fn fit(
         values
     };
     // what rays find there, of both halves; those that were drawn count, too
+    let batch = known.map_or(0, |k| k.batches);
     let by_rays = |points: &[[f64; 2]], rays: f64, before: Option<(f64, Vec<[f64; 2]>)>| {
+        let batch = if before.is_some() { batch } else { 0 };
         let (drawn, mut values) = before.unwrap_or_else(|| (0.0, vec![[0.0; 2]; groups * points.len()]));
         let fresh = (rays - drawn).max(0.0);
         if fresh == 0.0 {
@@ -261,7 +265,7 @@ pub(super) fn fit(
                 continue;
             }
             out.fill([0.0; 2]);
-            let key = seed::combine(seed::combine(cell.key, q as u64), drawn.to_bits());
+            let key = seed::combine(seed::combine(cell.key, q as u64), u64::from(batch));
             lamps.by_rays(kernel, (crowded, &sums, fresh), (cell.root as usize, x, element.normal()), key, &mut out);
             for (g, out) in out.iter().enumerate() {
                 (0..2).for_each(|h| values[g * points.len() + q][h] += out[h] * (fresh / rays));
@@ -309,7 +313,13 @@ pub(super) fn fit(
     let fresh = rays - known.map_or(0.0, |k| k.rays);
     let work = [seen.work(), crowded.iter().map(|c| fresh * f64::from(c.1)).sum()].map(|w: f64| w * count as f64);
     let doubt = if seen.is_crowded() || !crowded.is_empty() { lamps.doubt } else { 1.0 };
-    let known = (!crowded.is_empty()).then(|| Known::of(&cut, &found, count, crowded, [rays, whole]));
+    let known = (!crowded.is_empty()).then(|| Known {
+        crowded: crowded.into(),
+        rays,
+        whole,
+        batches: batch + 1,
+        ..Known::of(&cut, &found, count)
+    });
     // where no lamp shines it may be dark inside of something
     let dark = |q: usize| (0..groups).all(|g| values[g * count + q] == [0.0; 2]) && is_buried(grid.points[q]);
     let lit: Vec<bool> = (0..count).map(|q| !dark(q)).collect();
