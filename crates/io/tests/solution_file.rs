@@ -229,17 +229,19 @@ fn kept_samples_that_cannot_be_are_refused() {
     }
     assert!(open(forged("k.starts", |b| b[0] = 255)).is_err());
     assert!(open(forged("k.open", |b| b[0] = 2)).is_err());
+    assert!(open(forged("k.crowd", |b| b[0] = 2)).is_err());
+    assert!(open(forged("k.crowd", |b| b.truncate(1))).is_err());
 }
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
     #[test]
     fn whatever_kept_samples_say_nothing_panics(
-        which in 0usize..13, at in any::<prop::sample::Index>(), with in any::<[u8; 4]>(),
+        which in 0usize..14, at in any::<prop::sample::Index>(), with in any::<[u8; 4]>(),
     ) {
-        const NAMES: [&str; 13] = [
+        const NAMES: [&str; 14] = [
             "k.groups", "k.lamps", "k.direct", "k.misfit", "k.scattr", "k.lrays", "k.gather", "k.places", "k.keys",
-            "k.open", "k.ends", "k.leaves", "k.starts",
+            "k.open", "k.ends", "k.leaves", "k.starts", "k.crowd",
         ];
         let bytes = forged(NAMES[which], |b| {
             let at = at.index(b.len().saturating_sub(4).max(1));

@@ -56,6 +56,62 @@ fn a_bright_lamp_behind_the_ceiling_takes_nothing_from_a_faint_one_below() {
 }
 
 #[test]
+fn lamps_behind_the_ceiling_cost_next_to_nothing() {
+    let rays = |hidden: f64| {
+        let mut faces = room(0.5);
+        faces.push(lamp([0.6, 0.6, 0.9], 0.2, 1.0));
+        for k in 0..25 {
+            let at = |i: usize| 0.05 + 0.18 * i as f64;
+            faces.push(lamp([at(k % 5), at(k / 5), 1.3], 0.15, hidden));
+        }
+        let solution = solve(&faces, 0.03);
+        (solution.statistics().rays + solution.statistics().kernel_samples) as f64
+    };
+    let (faint, bright) = (rays(1e-3), rays(1000.0));
+    assert!(bright < 6.0 * faint, "{bright} rays and fits where faint ones take {faint}");
+}
+
+#[test]
+fn light_from_what_was_no_lamp_is_bounced_as_often_as_any() {
+    let mut faces = room(0.6);
+    faces.push(lamp([0.1, 0.1, 0.95], 0.25, 10.0));
+    faces.push(lamp([0.6, 0.6, 0.95], 0.25, 0.0));
+    let scene = samples::quads("room", &faces);
+    let [on, off] = [6, 7].map(|m: usize| scene.materials[m].name.clone());
+    let kept = solver(scene, 0.02).into_kept();
+    let mut again = Solver::resume(&kept).unwrap();
+    again.relight(&[Paint::Emission(on, Rgb::BLACK), Paint::Emission(off, Rgb::grey(10.0))]).unwrap();
+    balance(&mut again);
+    (faces[6].2, faces[7].2) = (Rgb::BLACK, Rgb::grey(10.0));
+    let fresh = light(&solve(&faces, 0.01));
+    let (stated, off) = (again.solution().statistics().estimated_error, light(&again.solution()) / fresh - 1.0);
+    assert!(off.abs() < stated + 0.01, "off by {off}, stated {stated}");
+}
+
+#[test]
+fn a_promise_that_comes_and_goes_leaves_the_stated_error_alone() {
+    // a crowd of small boards under the lamp, so that errors are told with a doubt
+    let mut faces = room(0.0);
+    faces.push(lamp([0.4, 0.4, 0.95], 0.2, 10.0));
+    for k in 0..196 {
+        let at = |i: usize| 0.02 + 0.07 * i as f64;
+        faces.push((lamp([at(k % 14), at(k / 14), 0.6], 0.05, 0.0).0, Rgb::grey(0.1), Rgb::BLACK));
+    }
+    let kept = solver(samples::quads("room", &faces), 0.03).into_kept();
+    let mut again = Solver::resume(&kept).unwrap();
+    let mut stated = |error: f64| {
+        again.promise(error).unwrap();
+        balance(&mut again);
+        again.solution().statistics().estimated_error
+    };
+    let first = stated(0.03);
+    let finer = stated(0.005);
+    let last = stated(0.03);
+    assert!(finer > 1.1 * first, "no doubt where there is a crowd: {first}, {finer}");
+    assert!((last / first - 1.0).abs() < 1e-3, "{first} became {last}");
+}
+
+#[test]
 fn a_lamp_of_its_own_material_costs_no_more_than_a_shared_one() {
     let lamps = |own: f64| -> Vec<Quad> {
         let at = |i: usize| 0.1 + 0.2 * i as f64 - 0.025;

@@ -16,6 +16,7 @@ pub(super) fn add<'a>(writer: &mut ChunkWriter<'a>, kept: &'a Kept) {
     writer.add_array("k.misfit", &kept.misfit);
     writer.add_array("k.scattr", &kept.scatter);
     writer.add_array("k.lrays", &kept.lamp_rays);
+    writer.add_array("k.crowd", &kept.crowded);
     writer.add_array("k.gather", &kept.gathers);
     writer.add_array("k.places", &kept.places);
     writer.add_array("k.keys", &kept.keys);
@@ -33,6 +34,7 @@ pub(super) fn read(file: &ChunkFile, scene: &Scene, forest: &Forest) -> Result<K
         misfit: file.finite_f32("k.misfit")?,
         scatter: file.finite_f32("k.scattr")?,
         lamp_rays: file.finite_f32("k.lrays")?,
+        crowded: file.array("k.crowd")?,
         gathers: file.array("k.gather")?,
         places: file.array("k.places")?,
         keys: file.array("k.keys")?,

@@ -22,6 +22,8 @@ pub(super) struct Fit {
     pub(super) scatter: Vec<f32>,
     /// Share of the element that is not inside of something.
     pub(super) lit: f64,
+    /// Whether lamps stand behind many things, so that its errors are told with a doubt.
+    pub(super) crowded: bool,
     /// Work that it took, in rays about: what was cut out exactly, and rays.
     pub(super) work: [f64; 2],
     /// What a fit with more rays need not find out again, if there is anything for rays to find.
@@ -229,7 +231,15 @@ pub(super) fn fit(
         let open = grid.points.iter().filter(|x| !is_buried(**x)).count();
         let (lit, _) = share_of(kernel, cell, open, grid.points.len());
         let coefficients = vec![0.0; groups * n];
-        return Fit { coefficients, misfit: zero.clone(), scatter: zero, lit, work: [points, 0.0], known: None };
+        return Fit {
+            coefficients,
+            misfit: zero.clone(),
+            scatter: zero,
+            lit,
+            work: [points, 0.0],
+            known: None,
+            crowded: false,
+        };
     }
     // a fit that goes on knows the lamps at its points only
     let once_more = || known.map(|_| lamps.seen_by(kernel, cell));
@@ -294,7 +304,7 @@ pub(super) fn fit(
             coefficients.extend(own);
         }
         let work = [seen.work() * count as f64, 0.0];
-        return Fit { coefficients, misfit, scatter: zero, lit: 1.0, work, known: None };
+        return Fit { coefficients, misfit, scatter: zero, lit: 1.0, work, known: None, crowded: false };
     }
     let grid = Grid::of(basis, cell.key);
     let count = grid.points.len();
@@ -312,7 +322,8 @@ pub(super) fn fit(
     let values: Vec<[f64; 2]> = found.iter().zip(&cut).map(|(found, cut)| found.map(|f| f + cut)).collect();
     let fresh = rays - known.map_or(0.0, |k| k.rays);
     let work = [seen.work(), crowded.iter().map(|c| fresh * f64::from(c.1)).sum()].map(|w: f64| w * count as f64);
-    let doubt = if seen.is_crowded() || !crowded.is_empty() { lamps.doubt } else { 1.0 };
+    let is_crowded = seen.is_crowded() || !crowded.is_empty();
+    let doubt = if is_crowded { lamps.doubt } else { 1.0 };
     let known = (!crowded.is_empty()).then(|| Known {
         crowded: crowded.into(),
         rays,
@@ -336,7 +347,15 @@ pub(super) fn fit(
             coefficients.extend(grid.one().map(|one| one * mean));
         }
         coefficients.resize(groups * n, 0.0);
-        return Fit { coefficients, misfit: zero.clone(), scatter: zero, lit: share, work, known: None };
+        return Fit {
+            coefficients,
+            misfit: zero.clone(),
+            scatter: zero,
+            lit: share,
+            work,
+            known: None,
+            crowded: false,
+        };
     }
     // what rays may have failed to find, and the groups to which there are too few to tell shape from scatter
     let (overlooked, sent) = lamps.overlooked(crowded, whole, rays * count as f64);
@@ -350,7 +369,15 @@ pub(super) fn fit(
         let rim_values = |g: usize| (0..rim.len()).map(move |q| g * rim.len() + q);
         let beside = |g: usize| rim_values(g).map(|k| 0.5 * (found[k][0] + found[k][1]) + cut[k]).sum::<f64>();
         let misfit = (0..groups).map(|g| (BESIDE * beside(g)) as f32).collect();
-        return Fit { coefficients: vec![0.0; groups * n], misfit, scatter: overlooked, lit: share, work, known };
+        return Fit {
+            coefficients: vec![0.0; groups * n],
+            misfit,
+            scatter: overlooked,
+            lit: share,
+            work,
+            known,
+            crowded: false,
+        };
     }
     let part = if alive == count { None } else { Some(grid.part(&lit, n)) };
     let matrix = part.as_ref().unwrap_or(&grid.matrix);
@@ -387,7 +414,7 @@ pub(super) fn fit(
         misfit.push((doubt * found) as f32);
         scatter.push(((doubt * scattered) as f32).hypot(overlooked[g]));
     }
-    Fit { coefficients, misfit, scatter, lit: share, work, known }
+    Fit { coefficients, misfit, scatter, lit: share, work, known, crowded: is_crowded }
 }
 
 /// Mean absolute value of a misfit, over its root mean square, about.

@@ -42,6 +42,8 @@ impl Sampled {
         self.misfit.resize(self.forest.len() * groups, 0.0);
         self.scatter.resize(self.forest.len() * groups, 0.0);
         self.lit.resize(self.forest.len(), 1.0);
+        self.crowded.reserve_exact(more);
+        self.crowded.resize(self.forest.len(), false);
         if self.cap.is_none() {
             self.known.resize(self.forest.len(), None);
         }

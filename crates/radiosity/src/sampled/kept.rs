@@ -32,6 +32,8 @@ pub struct Kept {
     pub scatter: Vec<f32>,
     /// Rays a point to lamps behind many things, a number a node.
     pub lamp_rays: Vec<f32>,
+    /// Whether errors of a node are among many things, and grow with a finer promise: 0 or 1.
+    pub crowded: Vec<u8>,
     /// Of each gathering element: node, points, directions drawn, samples of the first half (those that iterations use,
     /// the others) and of the second.
     pub gathers: Vec<[u32; 7]>,
@@ -63,6 +65,10 @@ impl Kept {
         length("misfits", self.misfit.len(), nodes * groups)?;
         length("scatters", self.scatter.len(), nodes * groups)?;
         length("numbers of rays", self.lamp_rays.len(), nodes)?;
+        length("marks of crowds", self.crowded.len(), nodes)?;
+        if self.crowded.iter().any(|c| *c > 1) {
+            return Err("a mark of a crowd other than 0 and 1".into());
+        }
         let all = |values: &[f32]| values.iter().all(|v| v.is_finite() && *v >= 0.0);
         if !all(&self.misfit) || !all(&self.scatter) || !all(&self.lamp_rays) {
             return Err("an error or a number of rays that is negative or no number".into());
@@ -169,6 +175,7 @@ impl Sampled {
             misfit: std::mem::take(&mut self.misfit),
             scatter: std::mem::take(&mut self.scatter),
             lamp_rays: std::mem::take(&mut self.rays),
+            crowded: std::mem::take(&mut self.crowded).into_iter().map(u8::from).collect(),
             ..Kept::default()
         };
         for gather in std::mem::take(&mut self.gathers) {
@@ -194,6 +201,7 @@ impl Sampled {
             misfit: kept.misfit.clone(),
             scatter: kept.scatter.clone(),
             rays: kept.lamp_rays.clone(),
+            crowded: kept.crowded.iter().map(|c| *c == 1).collect(),
             lit: solution.lit().to_vec(),
             irradiance: solution.coefficients().to_vec(),
             streaming,
@@ -219,9 +227,13 @@ impl Sampled {
     /// Promises another error.
     pub(crate) fn promise(&mut self, error: f64) {
         self.settings.error = error;
-        // what was measured with less doubt than the new promise calls for
-        let more = self.lamps.promise(error);
-        self.misfit.iter_mut().chain(&mut self.scatter).for_each(|e| *e *= more.max(1.0) as f32);
+        // what was measured with another doubt than the new promise calls for
+        let more = self.lamps.promise(error) as f32;
+        let groups = self.lamps.groups.len().max(1);
+        for errors in [&mut self.misfit, &mut self.scatter] {
+            let crowded = errors.chunks_mut(groups).zip(&self.crowded).filter(|(_, crowded)| **crowded);
+            crowded.for_each(|(errors, _)| errors.iter_mut().for_each(|e| *e *= more));
+        }
         self.begin_again();
     }
 

@@ -60,6 +60,7 @@ impl Sampled {
         let bytes = size_of::<Node>()
             + groups * (stride + 2) * size_of::<f32>()
             + size_of::<[f32; 2]>()
+            + size_of::<bool>()
             + LEAF_ARRAYS * stride * size_of::<[f64; 3]>()
             + size_of::<Form>();
         bytes as u64

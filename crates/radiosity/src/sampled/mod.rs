@@ -103,6 +103,8 @@ pub(crate) struct Sampled {
     scatter: Vec<f32>,
     /// Rays a point to the lamps that it may see past many things.
     rays: Vec<f32>,
+    /// Leaves among many things, whose errors grow with a finer promise.
+    crowded: Vec<bool>,
     /// What was found out of the lamps of each leaf.
     known: Vec<Option<Known>>,
     /// Share of each leaf that is not inside of something.
@@ -216,6 +218,7 @@ impl Sampled {
             lit: vec![1.0; nodes],
             known: vec![None; nodes],
             rays: vec![LEAST_LAMP_RAYS; nodes],
+            crowded: vec![false; nodes],
             verdicts: vec![Verdict::default(); gathers.len()],
             indirect: vec![[0.0; 3]; slots.len()],
             slots,
@@ -323,6 +326,7 @@ impl Sampled {
             self.misfit[own.clone()].copy_from_slice(&fit.misfit);
             self.scatter[own].copy_from_slice(&fit.scatter);
             self.lit[id.index()] = fit.lit as f32;
+            self.crowded[id.index()] = fit.crowded;
             (0..2).for_each(|k| self.work[k] += fit.work[k]);
             // a cap on memory has better use for it, and leaves it no place
             if let Some(known) = self.known.get_mut(id.index()) {
