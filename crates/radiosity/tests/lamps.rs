@@ -71,6 +71,45 @@ fn lamps_behind_the_ceiling_cost_next_to_nothing() {
     assert!(bright < 6.0 * faint, "{bright} rays and fits where faint ones take {faint}");
 }
 
+/// A room under a lamp with many small boards between.
+fn crowd() -> Vec<Quad> {
+    let mut faces = room(0.0);
+    faces.push(lamp([0.4, 0.4, 0.95], 0.2, 10.0));
+    for k in 0..196 {
+        let at = |i: usize| 0.02 + 0.07 * i as f64;
+        faces.push((lamp([at(k % 14), at(k / 14), 0.6], 0.05, 0.0).0, Rgb::grey(0.1), Rgb::BLACK));
+    }
+    faces
+}
+
+#[test]
+fn no_unit_of_length_is_better_than_another_among_many_things() {
+    let scaled = |k: f64| {
+        let mut faces = crowd();
+        faces.iter_mut().flat_map(|f| f.0.iter_mut()).flatten().for_each(|x| *x *= k);
+        light(&solve(&faces, 0.03))
+    };
+    let one = scaled(1.0);
+    for k in [1e-3, 1e3] {
+        assert!((scaled(k) / one - 1.0).abs() < 1e-6, "scale {k}: {} against {one}", scaled(k));
+    }
+}
+
+#[test]
+fn no_cap_on_memory_is_exceeded_and_none_wastes_what_it_allows() {
+    let after = |cap: u64| {
+        let settings = Settings { error: 0.01, ..Settings::default() };
+        let mut solver = Solver::new(samples::quads("crowd", &crowd()), settings).unwrap();
+        solver.limit_memory(cap).unwrap();
+        while solver.step().is_some() {
+            assert!(solver.counted_bytes() <= cap, "{} under a cap of {cap}", solver.counted_bytes());
+        }
+        solver.into_solution().statistics().estimated_error
+    };
+    let errors = [2_100_000, 3_000_000, 5_000_000].map(after);
+    assert!(errors[0] > errors[1] && errors[1] > errors[2], "{errors:?}");
+}
+
 #[test]
 fn light_from_what_was_no_lamp_is_bounced_as_often_as_any() {
     let mut faces = room(0.6);
@@ -90,14 +129,8 @@ fn light_from_what_was_no_lamp_is_bounced_as_often_as_any() {
 
 #[test]
 fn a_promise_that_comes_and_goes_leaves_the_stated_error_alone() {
-    // a crowd of small boards under the lamp, so that errors are told with a doubt
-    let mut faces = room(0.0);
-    faces.push(lamp([0.4, 0.4, 0.95], 0.2, 10.0));
-    for k in 0..196 {
-        let at = |i: usize| 0.02 + 0.07 * i as f64;
-        faces.push((lamp([at(k % 14), at(k / 14), 0.6], 0.05, 0.0).0, Rgb::grey(0.1), Rgb::BLACK));
-    }
-    let kept = solver(samples::quads("room", &faces), 0.03).into_kept();
+    // errors are told with a doubt
+    let kept = solver(samples::quads("crowd", &crowd()), 0.03).into_kept();
     let mut again = Solver::resume(&kept).unwrap();
     let mut stated = |error: f64| {
         again.promise(error).unwrap();

@@ -201,15 +201,7 @@ impl Gather {
             return;
         }
         self.fit = Vec::new();
-        self.order = if basis.is_nested() {
-            // through as many points functions would swing between them, nothing would say how wrong they are, and the
-            // balance might not converge
-            let spare = |p: usize| [0.0, 1.0, 1.5, 2.0][p.min(3)];
-            let fits = |p: usize| basis.truncated(p).len() as f64 * spare(p) <= points as f64;
-            (1..=basis.order()).rev().find(|&p| fits(p)).unwrap_or(1)
-        } else {
-            basis.order()
-        };
+        self.order = order_of(basis, points);
         let index = basis.truncated(self.order);
         let n = index.len();
         if n == 1 {
@@ -386,6 +378,18 @@ impl Gather {
             share: (n as f64 / points.max(1) as f64).sqrt(),
         }
     }
+}
+
+/// The order of the functions that so many points determine.
+pub(super) fn order_of(basis: &CellBasis, points: usize) -> usize {
+    if !basis.is_nested() {
+        return basis.order();
+    }
+    // through as many points functions would swing between them, nothing would say how wrong they are, and the balance
+    // might not converge
+    let spare = |p: usize| [0.0, 1.0, 1.5, 2.0][p.min(3)];
+    let fits = |p: usize| basis.truncated(p).len() as f64 * spare(p) <= points as f64;
+    (1..=basis.order()).rev().find(|&p| fits(p)).unwrap_or(1)
 }
 
 /// The lowest order of functions that a basis has by themselves.

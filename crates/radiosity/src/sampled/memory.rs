@@ -8,7 +8,7 @@
 use super::Sampled;
 use super::direct::Known;
 use super::field::Form;
-use super::gather::{Draw, Gather};
+use super::gather::{self, Draw, Gather};
 use super::points::Point;
 use super::rays::Ray;
 use super::verdict::Verdict;
@@ -71,17 +71,20 @@ impl Sampled {
     pub(super) fn bytes_of_points(&self, k: usize, points: u64) -> u64 {
         let gather = &self.gathers[k];
         let basis = self.forest.basis_of(gather.node);
-        let functions = basis.len() as u64;
-        let samples = 2 * u64::from(Gather::FIRST.min(gather.drawn)) * size_of::<Ray>() as u64;
-        let fit = functions * size_of::<f64>() as u64;
+        let samples = 2 * u64::from(Gather::FIRST) * size_of::<Ray>() as u64;
         let all = points + u64::from(gather.points());
-        let vectors = WORKING_VECTORS * functions * size_of::<[f64; 3]>() as u64;
-        points * (size_of::<Point>() as u64 + samples) + all * fit + vectors + 3 * BESIDE_AN_ARRAY as u64
+        let functions = basis.truncated(gather::order_of(basis, all as usize)).len() as u64;
+        let fit = if functions > 1 { all * functions * size_of::<f64>() as u64 } else { 0 };
+        let more = functions.saturating_sub(gather.functions(&self.forest).len() as u64);
+        let vectors = WORKING_VECTORS * more * size_of::<[f64; 3]>() as u64;
+        points * (size_of::<Point>() as u64 + samples) + fit + vectors + BESIDE_AN_ARRAY as u64
     }
 
     /// Bytes that a split of a gathering element into so many children takes, likewise; each has four new points.
     pub(super) fn bytes_of_children(&self, k: usize, children: usize) -> u64 {
-        let one = self.bytes_a_node() + BESIDE_A_GATHER as u64 + self.bytes_of_points(k, 4);
+        let own = self.gathers[k].functions(&self.forest).len() as u64;
+        let own = WORKING_VECTORS * own * size_of::<[f64; 3]>() as u64 + 3 * BESIDE_AN_ARRAY as u64;
+        let one = self.bytes_a_node() + BESIDE_A_GATHER as u64 + self.bytes_of_points(k, 4) + own;
         children as u64 * one
     }
 
@@ -123,10 +126,12 @@ impl Sampled {
         self.scene.bytes() + self.kernel.bytes()
     }
 
-    /// Bytes of the first samples of all points, drawn or not.
+    /// Bytes of the first samples of all points, drawn or not, and of the functions that come with them.
     fn first_bytes(&self) -> u64 {
-        let points: u64 = self.gathers.iter().map(|g| u64::from(g.points())).sum();
-        points * 2 * u64::from(Gather::FIRST) * size_of::<Ray>() as u64
+        let samples = 2 * u64::from(Gather::FIRST) * size_of::<Ray>() as u64;
+        (0..self.gathers.len())
+            .map(|k| self.bytes_of_points(k, 0) + u64::from(self.gathers[k].points()) * samples)
+            .sum()
     }
 
     /// Looks whether planned samples fit; if not, no more than the first of every element are stored from now on.
