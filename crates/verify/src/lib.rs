@@ -73,11 +73,14 @@ pub struct Verifier {
     points: usize,
     /// Paths of one third are the square of this.
     steps: u32,
+    /// Points of one step.
+    batch: usize,
     found: Vec<Found>,
 }
 
-/// Points of one step: some ten milliseconds of work.
-const BATCH: usize = 32;
+/// Fewest and most points of one step, and the rays that it has about: some ten milliseconds of work in usual rooms.
+const BATCH: (f64, f64) = (4.0, 32.0);
+const RAYS: f64 = 4e6;
 /// Paths of a third times the square of the promise: so many that 2,000 points decide about most errors.
 const PATHS: f64 = 2.0;
 /// Fewest and most of the square root of a third's paths.
@@ -115,6 +118,8 @@ impl Verifier {
         }
         let shape = |side: &Side| scene.patches[side.patch as usize].shape;
         let steps = (PATHS.sqrt() / promised.max(1e-9)).ceil().clamp(f64::from(STEPS.0), f64::from(STEPS.1));
+        let reflected = scene.materials.iter().map(|m| m.reflectance.max()).fold(0.0, f64::max);
+        let rays = 3.0 * steps * steps / (1.0 - reflected).max(1e-3);
         Ok(Verifier {
             tracer: Tracer::new(scene),
             sides,
@@ -123,6 +128,7 @@ impl Verifier {
             promised,
             points: points as usize,
             steps: steps as u32,
+            batch: (RAYS / rays).clamp(BATCH.0, BATCH.1) as usize,
             found: Vec::new(),
         })
     }
@@ -131,7 +137,7 @@ impl Verifier {
     /// side-local coordinates of a side of the scene.
     pub fn step(&mut self, irradiance: impl Fn(usize, [f64; 2]) -> Rgb + Sync) -> bool {
         let from = self.found.len();
-        let count = BATCH.min(self.points - from);
+        let count = self.batch.min(self.points - from);
         let next = par::map(count, |k| self.look(&irradiance, (from + k) as u64));
         self.found.extend(next);
         count > 0
