@@ -1,5 +1,6 @@
 //! Many lamps, hidden lamps, lamps of very different strength: none is forgotten, and none is paid for twice.
 
+use ondelette_radiosity::ledger::Ledger;
 use ondelette_radiosity::scene::{Paint, samples};
 use ondelette_radiosity::{Event, Rgb, Scene, Settings, Solution, Solver};
 
@@ -204,4 +205,30 @@ fn lighting_anew_with_the_same_lamps_keeps_the_promise_without_a_ray() {
         assert!(statistics.estimated_error <= error, "{error}: {}", statistics.estimated_error);
         assert_eq!(statistics.rays, kept.statistics().rays);
     }
+}
+
+/// The six sides of a block, seen from outside.
+fn block([x, y, z]: [f64; 3], size: [f64; 3], reflectance: f64) -> Vec<Quad> {
+    let mut faces = room(reflectance);
+    for (corners, ..) in &mut faces {
+        corners.reverse();
+        *corners = corners.map(|p| [x + size[0] * p[0], y + size[1] * p[1], z + size[2] * p[2]]);
+    }
+    faces
+}
+
+#[test]
+fn a_bright_box_in_a_wide_field_closes_the_ledger() {
+    // its sides are tiny beside the field, and yet they hold nearly all of the light
+    let mut faces = room(0.9);
+    faces.remove(3);
+    faces.push(lamp([0.25, 0.25, 0.95], 0.1, 1000.0));
+    faces.extend(block([0.25, 0.25, 0.1], [0.15, 0.25, 0.4], 0.9));
+    faces.extend(block([0.6, 0.5, 0.0025], [0.25, 0.35, 0.2475], 0.9));
+    let (low, high) = (-48.2, 51.8);
+    let field = [[low, low, -0.5], [high, low, -0.5], [high, high, -0.5], [low, high, -0.5]];
+    faces.push((field, Rgb::grey(0.1), Rgb::BLACK));
+    let solution = solve(&faces, 0.05);
+    let closure = Ledger::count(&solution, 1 << 16).closure();
+    assert!(closure.abs() < 0.06, "the ledger is open by {closure}");
 }
