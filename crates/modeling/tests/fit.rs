@@ -94,6 +94,31 @@ fn a_fit_that_does_not_converge_says_so() {
 }
 
 #[test]
+fn a_fit_that_hardly_smooths_is_right_or_says_that_it_is_not() {
+    // Coefficients were off by more than all heights together from weights of 1e-12 on, and the fit was content.
+    let (places, heights) = wave(150, [1.0, 1.0]);
+    let mean = heights.iter().sum::<f64>() / 150.0;
+    for power in [2, 4, 6, 7, 8, 9, 10, 11, 12, 13, 14, 16] {
+        let weight = 10.0_f64.powi(-power);
+        let settings =
+            FitSettings { weight: Some(weight), stiffening: Some(0.0), spans: Some(16), ..FitSettings::default() };
+        let fit = surface(&Scatter::new(places.clone(), heights.clone()).unwrap(), settings).unwrap();
+        let soft = |(i, (p, z)): (usize, (&[f64; 2], &f64))| {
+            Constraint::new(i.to_string(), p, Demand::Position(vec![Some(z - mean)])).soft(1.0 / weight)
+        };
+        let rows = places.iter().zip(&heights).enumerate().map(soft).collect();
+        let problem = Problem::new(fit.space.clone(), 1, Energy::BEND, None, rows).unwrap();
+        let want = Solver::new(problem, Settings::default()).and_then(Solver::run).unwrap();
+        assert!(want.converged(), "1e-{power}");
+        let pairs = fit.coefficients.iter().zip(&want.coefficients()[0]);
+        let off = pairs.fold(0.0, |m: f64, (a, b)| m.max((a - mean - b).abs()));
+        let size = want.coefficients()[0].iter().fold(0.0, |m: f64, b| m.max(b.abs()));
+        assert!(fit.converged || power > 9, "1e-{power}: off by {off:e} of {size:e}");
+        assert!(!fit.converged || off < 1e-4 * size, "1e-{power}: off by {off:e} of {size:e}");
+    }
+}
+
+#[test]
 fn what_is_given_leaves_the_other_free_even_where_no_search_would_go() {
     let (places, heights) = wave(300, [1.0, 1.0]);
     let scatter = Scatter::new(places, heights).unwrap();

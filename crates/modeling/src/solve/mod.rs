@@ -14,6 +14,7 @@ mod curving;
 pub(crate) mod cycle;
 mod edges;
 mod green;
+mod gradients;
 mod method;
 mod multigrid;
 mod oracle;
