@@ -211,3 +211,23 @@ fn an_answer_that_did_not_converge_moves_nothing() {
     let after = solver.solution();
     assert_eq!((before.notes(), before.coefficients()), (after.notes(), after.coefficients()));
 }
+
+#[test]
+fn an_answer_has_all_iterations_that_a_solution_has() {
+    // What the solution took was taken from the answers.
+    let with = |most_iterations: usize| {
+        let settings = Settings { method: Method::Bpx, most_iterations, ..Settings::default() };
+        let mut solver = Solver::new(problem(Boundary::Open, 1), settings).unwrap();
+        solver.finish().unwrap();
+        solver
+    };
+    let free = with(10_000);
+    let taken = free.solution().iterations();
+    assert!(taken > 5);
+    let mut solver = with(taken + 1);
+    assert!(solver.solution().converged());
+    let answer = solver.response("p3", 0).unwrap().unwrap();
+    let mut free = free;
+    assert_eq!(answer, free.response("p3", 0).unwrap().unwrap());
+    assert_eq!(solver.solution().iterations(), taken, "the solution's own");
+}

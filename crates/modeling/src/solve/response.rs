@@ -78,6 +78,8 @@ impl Solver {
         while self.at == (b, s) && self.stage != Stage::Finished {
             let method = self.method;
             if let Err(e) = self.advance() {
+        // The limit of iterations is one a solution.
+        self.iterations = 0;
                 outcome = Err(e);
                 break;
             }
