@@ -62,18 +62,18 @@ impl Solver {
             self.notes.push("constraints weigh too little beside the energy to hold the shape".to_owned());
             self.converged = false;
         }
-        if met && self.followers.is_empty() {
+        if met && self.dropped.followers.is_empty() {
             return;
         }
         // By name: rows that were left out because they follow from others are looked at as well.
         let coefficients = self.coefficients();
         let mut missed: Vec<(usize, f64)> = Vec::new();
-        let noted = |c: usize| self.left_out.binary_search(&c).is_ok();
+        let noted = |c: usize| self.dropped.missed.binary_search(&c).is_ok();
         for row in self.problem.rows().iter().filter(|r| r.give == 0.0 && !noted(r.constraint)) {
             let value: f64 = row.entries().map(|(c, i, v)| v * coefficients[c][i]).sum();
             let miss = (value - row.target).abs();
             // What follows from others follows up to their rounding.
-            let follows = self.followers.binary_search(&row.constraint).is_ok();
+            let follows = self.dropped.followers.binary_search(&row.constraint).is_ok();
             if miss.is_nan() || miss > if follows { 1e2 * allowed } else { allowed } {
                 match missed.last_mut().filter(|m| m.0 == row.constraint) {
                     Some(m) => m.1 = m.1.max(miss * row.length),

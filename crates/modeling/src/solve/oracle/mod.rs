@@ -18,8 +18,9 @@ mod offset;
 mod values;
 mod wake;
 
+use super::dropped::notes;
 use super::method::Method;
-use super::refine::{SolveError, notes};
+use super::refine::SolveError;
 use super::solution::{Residual, Solution};
 use crate::constraint::Demand;
 use crate::energy::Operator;
