@@ -63,6 +63,40 @@ fn slopes_and_images_alone_are_enough_for_every_solver() {
 }
 
 #[test]
+fn slopes_alone_are_enough_for_curves() {
+    let slope = |id: &str, t: f64, by: &[f64]| {
+        Constraint::new(id, &[t], Demand::Derivative(0, by.iter().copied().map(Some).collect()))
+    };
+    for boundary in [Boundary::Periodic, Boundary::Mirrored, Boundary::Open] {
+        for spans in [8, 16, 32, 128] {
+            let space = Space::curve(Axis::new(boundary, spans, [0.0, 1.0]).unwrap());
+            let energies = [Energy::BEND, Energy::new(1.0, 1.0, 0.0).unwrap(), Energy::new(0.0, 0.0, 1.0).unwrap()];
+            for (coordinates, energy) in [1, 2].into_iter().flat_map(|k| energies.map(|e| (k, e))) {
+                let rows = |soft: bool| {
+                    let rows =
+                        [slope("a", 0.3, &[1.0, 0.2][..coordinates]), slope("b", 0.7, &[-0.5, 0.4][..coordinates])];
+                    rows.map(|r| if soft { r.soft(1e3) } else { r }).to_vec()
+                };
+                for soft in [false, true] {
+                    let problem = Problem::new(space.clone(), coordinates, energy, None, rows(soft)).unwrap();
+                    let name = format!("{boundary:?} {spans} {energy:?} {coordinates} {soft}");
+                    let want = run(&problem, Method::Bpx);
+                    assert!(want.converged(), "{name}: {:?}", want.notes());
+                    let wavelet = (spans > 8).then_some(Method::Wavelet);
+                    for method in [Method::Auto, Method::Banded, Method::Cholesky].into_iter().chain(wavelet) {
+                        let found = run(&problem, method);
+                        assert!(found.converged(), "{name} {method}: {:?}", found.notes());
+                        // Parabolas have no third derivative.
+                        let over = (found.energy() - want.energy()).abs();
+                        assert!(over < 1e-6 * want.energy() + 1e-12, "{name} {method}: {over:e}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
 fn a_coordinate_that_is_zero_is_as_good_as_any() {
     let at = |id: &str, t: f64, x: f64, y: f64| Constraint::new(id, &[t], Demand::Position(vec![Some(x), Some(y)]));
     // What is soft would pull y away from zero, but is at a point that is held there.

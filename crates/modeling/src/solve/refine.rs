@@ -362,7 +362,7 @@ impl Solver {
                 Box::new(Spectral::new(&self.h).ok_or_else(|| unfit("it needs mirrored or periodic axes"))?)
             }
             Method::Banded => {
-                if let Some(banded) = Banded::new(&self.h, structure.clone()) {
+                if let Some(banded) = Banded::new(&self.h, structure.clone(), energy.free_degree()) {
                     return Ok(Box::new(banded));
                 }
                 let green = BandGreen::new(&self.h, energy.free_degree());
