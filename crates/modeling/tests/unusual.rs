@@ -97,6 +97,24 @@ fn slopes_alone_are_enough_for_curves() {
 }
 
 #[test]
+fn many_soft_points_of_a_long_curve_are_solved_unasked() {
+    // A sparse factor has no digits left for the energy; that there were too many rows was said of surfaces.
+    let unit = |k: u64, i: u64| ondelette_numerics::seed::unit(ondelette_numerics::seed::combine(k, i));
+    for length in [1e9, 1e12] {
+        let space = Space::curve(Axis::new(Boundary::Open, 1024, [0.0, length]).unwrap());
+        let point = |i: u64| {
+            let to = Demand::Position(vec![Some((6.0 * i as f64 / 2600.0).sin() + 0.1 * unit(1, i))]);
+            Constraint::new(format!("{i}"), &[length * (i as f64 + unit(2, i)) / 2600.0], to).soft(1.0)
+        };
+        let problem = Problem::new(space, 1, Energy::BEND, None, (0..2600).map(point).collect()).unwrap();
+        let (want, found) = (run(&problem, Method::Banded), run(&problem, Method::Auto));
+        let over = found.energy() / want.energy() - 1.0;
+        assert!(want.converged() && found.converged(), "{length:e}: {:?}", found.notes());
+        assert!(over.abs() < 1e-6, "{length:e}: {over:e}");
+    }
+}
+
+#[test]
 fn a_coordinate_that_is_zero_is_as_good_as_any() {
     let at = |id: &str, t: f64, x: f64, y: f64| Constraint::new(id, &[t], Demand::Position(vec![Some(x), Some(y)]));
     // What is soft would pull y away from zero, but is at a point that is held there.

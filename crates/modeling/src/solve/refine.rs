@@ -370,9 +370,8 @@ impl Solver {
             }
             Method::Cholesky => {
                 let solver = SparseSolver::new(&self.h, structure, energy.free_degree());
-                return Ok(Box::new(
-                    solver.ok_or_else(|| unfit("the matrix has no factor; do weights differ too much?"))?,
-                ));
+                let why = "weights are too large beside the energy, which is little on a long domain";
+                return Ok(Box::new(solver.ok_or_else(|| unfit(why))?));
             }
             Method::Multigrid if structure.rows() <= auto::CYCLES || space.is_curve() => {
                 let green = CycleGreen::new(space, energy, map, &self.h);
