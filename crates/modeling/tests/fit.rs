@@ -172,6 +172,36 @@ fn a_fair_curve_reaches_tolerances_far_below_the_noise_and_says_which_it_cannot(
 }
 
 #[test]
+fn generous_tolerances_give_fair_curves_too() {
+    // Weights sank until no solver held the points, and the worst of those curves was the fairest by its energy.
+    let line: Vec<Vec<f64>> = (0..40).map(|i| vec![f64::from(i), 2.0 * f64::from(i)]).collect();
+    let rough: Vec<Vec<f64>> = line
+        .iter()
+        .zip(0..)
+        .map(|(p, i)| vec![p[0] + 0.02 * (random(6, i) - 0.5), p[1] + 0.02 * (random(7, i) - 0.5)])
+        .collect();
+    let wing: Vec<Vec<f64>> = (0..60)
+        .map(|i| {
+            let a = f64::from(i) / 59.0 * std::f64::consts::TAU;
+            let x = 0.5 * (1.0 + a.cos());
+            vec![x, a.sin().signum() * 0.6 * (0.297 * x.sqrt() - 0.126 * x - 0.351 * x * x + 0.18 * x.powi(3))]
+        })
+        .collect();
+    for (name, points) in [("line", &line), ("rough", &rough), ("wing", &wing)] {
+        for tolerance in [0.03, 0.1, 0.5, 1.5, 10.0] {
+            let found = fair(points, tolerance).unwrap();
+            assert!(found.curve.converged(), "{name} {tolerance}: {:?}", found.curve.notes());
+            assert!(found.largest_move <= tolerance, "{name} {tolerance}: {:e}", found.largest_move);
+            let energy = found.curve.energy();
+            assert!(
+                tolerance < 0.5 || energy < 1e-9,
+                "{name} {tolerance}: a parabola is as fair as can be, not {energy:e}"
+            );
+        }
+    }
+}
+
+#[test]
 fn numbers_out_of_all_proportion_are_named_for_what_they_are() {
     let (places, heights) = wave(200, [1.0, 1.0]);
     let data = Scatter::new(places.clone(), heights.clone()).unwrap();
