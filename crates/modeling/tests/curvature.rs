@@ -249,6 +249,8 @@ fn bends_that_contradict_each_other_are_not_told_to_take_a_weight() {
     assert!(!found.converged());
     let said = |word: &str| found.notes().iter().any(|n| n.contains(word));
     assert!(said("constraint l contradicts k") && !said("weight"), "{:?}", found.notes());
+    // No step was taken.
+    assert!(!said("did not settle"), "{:?}", found.notes());
 }
 
 #[test]

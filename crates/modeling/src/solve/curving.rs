@@ -204,7 +204,9 @@ impl Solver {
             }
         }
         self.converged = false;
-        self.notes.push(format!("curvature: {} steps did not settle", self.newton));
+        if self.newton > 0 {
+            self.notes.push(format!("curvature: {} steps did not settle", self.newton));
+        }
         self.judge_curvature();
         false
     }
