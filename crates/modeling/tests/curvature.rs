@@ -298,3 +298,14 @@ fn low_heights_bend_as_they_are_asked_to() {
     let found = solve(64, Energy::BEND, 1, &flat);
     assert!(found.converged() && found.iterations() == 0, "{:?}", found.notes());
 }
+    // Whatever they are above.
+    for offset in [0.0, 1.0, -10.0] {
+        let rows =
+            [at("a", 0.0, &[offset]), at("b", 0.5, &[offset + 1e-10]), at("c", 1.0, &[offset]), bent("k", 0.5, -4e-9)];
+        let found = solve(32, Energy::BEND, 1, &rows);
+        let miss = found.residuals().last().unwrap().miss.abs();
+        // Second derivatives of 32 spans have no more digits.
+        let least = 1e-17_f64.max(1e-11 * offset.abs());
+        assert!(found.converged(), "above {offset}: {:?}", found.notes());
+        assert!(miss < least, "above {offset}: {miss:e}");
+    }

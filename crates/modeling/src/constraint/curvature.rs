@@ -14,6 +14,8 @@ pub(crate) struct Seen {
     two: Functional,
     d1: Vec<f64>,
     d2: Vec<f64>,
+    /// The curvature that rounding alone makes of heights, which may lie far from zero.
+    noise: f64,
     /// Curvature and its gradients by the first and second derivative; `None` where the tangent has collapsed.
     found: Option<(f64, Vec<f64>, Vec<f64>)>,
 }
@@ -132,9 +134,9 @@ impl Seen {
         self.found.as_ref().map(|f| f.0 - self.want).filter(|m| m.is_finite())
     }
 
-    /// What a miss is judged by, for a shape of some [`usual`] curvature.
-    pub(crate) fn unit(&self, usual: f64) -> f64 {
-        self.want.abs().max(usual)
+    /// The miss that is as good as none, with a share of the curvature wanted, or of the [`usual`] one of the shape.
+    pub(crate) fn allowed(&self, share: f64, usual: f64) -> f64 {
+        (share * self.want.abs().max(usual)).max(self.noise)
     }
 
     /// The hard row around this curve, and soft ones that hold the derivatives where `force` times the curvature bends
@@ -203,7 +205,11 @@ pub(crate) fn look(problem: &Problem, coefficients: &[Vec<f64>]) -> Vec<Seen> {
         let speed = d1.iter().map(|v| v * v).sum::<f64>().sqrt();
         let collapsed = d1.len() > 1 && speed <= COLLAPSED * size * length_of(&one);
         let found = curvature(&d1, &d2).filter(|_| !collapsed);
-        out.push(Seen { constraint, want, one, two, d1, d2, found });
+        let noise = match coefficients {
+            [x] => ROUNDING * two.entries().map(|(i, v)| (v * x[i]).abs()).sum::<f64>(),
+            _ => 0.0,
+        };
+        out.push(Seen { constraint, want, one, two, d1, d2, noise, found });
     }
     out
 }
@@ -223,6 +229,9 @@ pub(crate) fn usual(problem: &Problem, coefficients: &[Vec<f64>]) -> f64 {
     let axis = &problem.space().axes()[0];
     let run = if coefficients.len() == 1 { 1.0 / axis.density() } else { 0.0 };
     let n = coefficients.first().map_or(0, Vec::len);
+/// Sums of coefficients are rounded to this share of the sum of their sizes.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
+
     let step = |i: usize| -> f64 {
         let square: f64 = coefficients.iter().map(|x| (x[i + 1] - x[i]).powi(2)).sum();
         (square + run * run).sqrt()
@@ -230,7 +239,12 @@ pub(crate) fn usual(problem: &Problem, coefficients: &[Vec<f64>]) -> f64 {
     let even = 1.0 / (0..n.saturating_sub(1)).map(step).sum::<f64>();
     let [height] = coefficients else { return even };
     let side = axis.domain()[1] - axis.domain()[0];
-    even.min(height.iter().fold(0.0, |m: f64, v| m.max(v.abs())) / side / side)
+    let (low, high) = range(height);
+    even.min((high - low) / side / side)
+}
+
+fn range(of: &[f64]) -> (f64, f64) {
+    of.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)))
 }
 
 #[cfg(test)]

@@ -239,7 +239,7 @@ impl Solver {
         let usual = curvature::usual(&self.problem, shape);
         let seen = curvature::look(&self.problem, shape);
         let most = self.settings.tolerance.max(1e-12);
-        misses.iter().zip(seen).all(|(m, s)| m.abs() <= most * s.unit(usual))
+        misses.iter().zip(seen).all(|(m, s)| m.abs() <= s.allowed(most, usual))
     }
 
     /// Energy with that of the soft rows.

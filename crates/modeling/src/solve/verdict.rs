@@ -146,7 +146,7 @@ impl Solver {
                     ));
                     self.converged = false;
                 }
-                Some(miss) if miss.abs() <= allowed * s.unit(usual) => {}
+                Some(miss) if miss.abs() <= s.allowed(allowed, usual) => {}
                 Some(miss) => missed.push((s.constraint, miss.abs())),
             }
         }
