@@ -72,6 +72,16 @@ fn a_long_domain_has_more_spans_along_than_across() {
 }
 
 #[test]
+fn rounding_on_a_very_long_domain_is_no_lack_of_convergence() {
+    // Cells of 4000 by 0.25: the stiffest shapes cost 1e30 times what the softest do.
+    let (places, heights) = wave(150, [1e6, 1.0]);
+    let given = FitSettings { weight: Some(4.6e7), stiffening: Some(316.0), ..FitSettings::default() };
+    let fit = surface(&Scatter::new(places, heights).unwrap(), given).unwrap();
+    assert_eq!(fit.space.axes().iter().map(|a| a.spans()).collect::<Vec<_>>(), [256, 4]);
+    assert!(fit.converged);
+}
+
+#[test]
 fn the_smoothing_of_a_long_domain_is_chosen_as_that_of_a_square_one() {
     // The same wave four times as long, with four times the points: as predictable as one square of it.
     let of = |i: u64| {

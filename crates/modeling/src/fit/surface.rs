@@ -219,6 +219,8 @@ pub fn surface(data: &Scatter, settings: FitSettings) -> Result<Fit, FitError> {
 const MOST: usize = 2000;
 /// The sum may be above its least by this share of the energy.
 const SETTLED: f64 = 1e-8;
+/// Where rounding keeps the sum up, this many times the share will do.
+const SLACK: f64 = 1e3;
 /// Coefficients are rounded to this share of their size.
 const ROUNDING: f64 = 1e-15;
 /// An energy whose largest entry is this share of the data's is lost in their rounding.
@@ -377,7 +379,7 @@ impl Part {
             let size = x.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
             (SETTLED * (misses + energy).min(energy.max(even))).max((ROUNDING * size).powi(2) * trace)
         };
-        Ok(cycle.settle(&fold.right, &mut fold.x, 1e-8, MOST, &goal))
+        Ok(cycle.settle(&fold.right, &mut fold.x, 1e-8, MOST, &goal, SLACK))
     }
 
     /// Root mean square of the predictions of what all folds leave out.

@@ -78,7 +78,8 @@ impl Cycle {
     }
 
     /// The same, and then on until the energy above the least is within what `goal` allows for an x: by the true
-    /// residual and the least eigenvalue that the steps have met. False where that is not reached.
+    /// residual and the least eigenvalue that the steps have met. Where rounding does not let it, `slack` times as much
+    /// will do; false where that is not reached.
     pub(crate) fn settle(
         &mut self,
         b: &[f64],
@@ -86,6 +87,7 @@ impl Cycle {
         tolerance: f64,
         most: usize,
         goal: &dyn Fn(&[f64]) -> f64,
+        slack: f64,
     ) -> bool {
         if self.is_direct() {
             self.cycle(b, x);
@@ -106,11 +108,11 @@ impl Cycle {
                 return true;
             }
             if iterations >= most || left.is_nan() || left > 0.5 * before {
-                return false;
+                return left <= slack * goal;
             }
             (aim, before) = (Aim::Energy(BELOW * goal), left);
         }
-        false
+        before <= slack * goal(x)
     }
 
     /// Whether the aim was reached, and in how many iterations; `least` follows the least Ritz value.
