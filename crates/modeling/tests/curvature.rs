@@ -186,7 +186,24 @@ fn a_row_that_is_missed_is_named_whatever_the_solver_says() {
         at("c7", -0.250_366_648_337_772_34, &[0.242_003_802_595_648_35]).soft(1.288),
         at("c11", -0.748_945_425_289_596_5, &[0.200_863_278_363_686_56]).soft(9.77),
     ];
-    let problem = Problem::new(Space::curve(axis), 1, Energy::new(1.0, 0.0, 0.0).unwrap(), None, rows).unwrap();
+    let problem = Problem::new(Space::curve(axis), 1, Energy::new(1.0, 0.0, 0.0).unwrap(), None, rows.clone()).unwrap();
+    // One whose other coordinate is left out, which a note says, is named for this one too.
+    let other = |to: Vec<Option<f64>>, at: f64, id: &str| Constraint::new(id, &[at], Demand::Position(to));
+    let mut both: Vec<Constraint> = vec![other(vec![None, Some(1.0)], rows[2].at[0] - 5e-9, "beside")];
+    both.extend(rows.iter().enumerate().map(|(i, row)| {
+        let more = |v: &[Option<f64>]| vec![v[0], (i == 2).then_some(1.0 + 1e-8)];
+        let mut row = row.clone();
+        match &mut row.demand {
+            Demand::Position(v) | Demand::Derivative(_, v) => *v = more(v),
+            _ => {}
+        }
+        row
+    }));
+    let twice = Problem::new(Space::curve(axis), 2, Energy::new(1.0, 0.0, 0.0).unwrap(), None, both).unwrap();
+    let settings = Settings { method: Method::Cholesky, ..Settings::default() };
+    let found = Solver::new(twice, settings).and_then(Solver::run).unwrap();
+    assert!(found.notes().iter().any(|n| n.contains("constraint c2 cannot be told from beside")));
+    assert!(found.notes().iter().any(|n| n.starts_with("constraint c2 is missed by 4")), "{:?}", found.notes());
     for method in [Method::Cholesky, Method::Auto, Method::Banded] {
         let settings = Settings { method, ..Settings::default() };
         let found = Solver::new(problem.clone(), settings).and_then(Solver::run).unwrap();
