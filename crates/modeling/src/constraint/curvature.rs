@@ -218,8 +218,8 @@ fn length_of(f: &Functional) -> f64 {
     f.entries().map(|(_, v)| v * v).sum::<f64>().sqrt()
 }
 
-/// Places in space with less than this share of the usual curvature are about straight: its size has a kink there, which
-/// one row around it knows nothing of.
+/// Places in space with less than this share of the usual curvature are about straight: its size has a kink there,
+/// which one row around it knows nothing of.
 const STRAIGHT: f64 = 2e-5;
 
 /// A first derivative that is this share of what coefficients of the shape's size could give is none.
