@@ -186,7 +186,24 @@ fn a_row_that_is_missed_is_named_whatever_the_solver_says() {
         at("c7", -0.250_366_648_337_772_34, &[0.242_003_802_595_648_35]).soft(1.288),
         at("c11", -0.748_945_425_289_596_5, &[0.200_863_278_363_686_56]).soft(9.77),
     ];
-    let problem = Problem::new(Space::curve(axis), 1, Energy::new(1.0, 0.0, 0.0).unwrap(), None, rows).unwrap();
+    let problem = Problem::new(Space::curve(axis), 1, Energy::new(1.0, 0.0, 0.0).unwrap(), None, rows.clone()).unwrap();
+    // One whose other coordinate is left out, which a note says, is named for this one too.
+    let other = |to: Vec<Option<f64>>, at: f64, id: &str| Constraint::new(id, &[at], Demand::Position(to));
+    let mut both: Vec<Constraint> = vec![other(vec![None, Some(1.0)], rows[2].at[0] - 5e-9, "beside")];
+    both.extend(rows.iter().enumerate().map(|(i, row)| {
+        let more = |v: &[Option<f64>]| vec![v[0], (i == 2).then_some(1.0 + 1e-8)];
+        let mut row = row.clone();
+        match &mut row.demand {
+            Demand::Position(v) | Demand::Derivative(_, v) => *v = more(v),
+            _ => {}
+        }
+        row
+    }));
+    let twice = Problem::new(Space::curve(axis), 2, Energy::new(1.0, 0.0, 0.0).unwrap(), None, both).unwrap();
+    let settings = Settings { method: Method::Cholesky, ..Settings::default() };
+    let found = Solver::new(twice, settings).and_then(Solver::run).unwrap();
+    assert!(found.notes().iter().any(|n| n.contains("constraint c2 cannot be told from beside")));
+    assert!(found.notes().iter().any(|n| n.starts_with("constraint c2 is missed by 4")), "{:?}", found.notes());
     for method in [Method::Cholesky, Method::Auto, Method::Banded] {
         let settings = Settings { method, ..Settings::default() };
         let found = Solver::new(problem.clone(), settings).and_then(Solver::run).unwrap();
@@ -249,6 +266,8 @@ fn bends_that_contradict_each_other_are_not_told_to_take_a_weight() {
     assert!(!found.converged());
     let said = |word: &str| found.notes().iter().any(|n| n.contains(word));
     assert!(said("constraint l contradicts k") && !said("weight"), "{:?}", found.notes());
+    // No step was taken.
+    assert!(!said("did not settle"), "{:?}", found.notes());
 }
 
 #[test]
@@ -263,7 +282,18 @@ fn straight_places_in_space_are_found() {
         for (spans, energy) in [(32, Energy::BEND), (64, Energy::new(1.0, 1.0, 0.0).unwrap())] {
             let straight = solve(spans, energy, 3, &[&points[..], &[bent("k", place, 0.0)]].concat());
             assert!(straight.converged() && worst(&straight) < 1e-7, "{place}: {:?}", straight.notes());
-            // Hardly bent is hardly more.
+            // Hardly bent is hardly more, however hardly, and falls with the curvature allowed.
+            let with = |k: f64| {
+                let found = solve(spans, energy, 3, &[&points[..], &[bent("k", place, k)]].concat());
+                assert!(found.converged() && worst(&found) < 1e-7, "{place} {k:e}: {:?}", found.notes());
+                found.energy() / straight.energy() - 1.0
+            };
+            let slope = with(1e-3) / 1e-3;
+            assert!(slope < 0.0, "{place}: {slope}");
+            for k in [1e-300, 1e-14, 1e-12, 1e-10, 1e-9, 1e-8, 1e-7, 3e-7, 1e-6, 3e-6, 1e-5, 3e-5, 1e-4] {
+                let (less, want) = (with(k), slope * k);
+                assert!((less - want).abs() < 0.02 * want.abs() + 1e-12, "{place} {k:e}: {less:e} not {want:e}");
+            }
             let hardly = solve(spans, energy, 3, &[&points[..], &[bent("k", place, 1e-4)]].concat());
             let less = hardly.energy() / straight.energy() - 1.0;
             assert!(less.abs() < 1e-2, "{place}: {less}");
@@ -290,6 +320,17 @@ fn low_heights_bend_as_they_are_asked_to() {
         let miss = found.residuals().last().unwrap().miss;
         assert!(found.converged(), "{height} over {length}: {:?}", found.notes());
         assert!(miss.abs() <= 1e-3 * want.abs(), "{height} over {length}: {miss:e} of {want:e}");
+    }
+    // Whatever they are above.
+    for offset in [0.0, 1.0, -10.0] {
+        let rows =
+            [at("a", 0.0, &[offset]), at("b", 0.5, &[offset + 1e-10]), at("c", 1.0, &[offset]), bent("k", 0.5, -4e-9)];
+        let found = solve(32, Energy::BEND, 1, &rows);
+        let miss = found.residuals().last().unwrap().miss.abs();
+        // Second derivatives of 32 spans have no more digits.
+        let least = 1e-17_f64.max(1e-11 * offset.abs());
+        assert!(found.converged(), "above {offset}: {:?}", found.notes());
+        assert!(miss < least, "above {offset}: {miss:e}");
     }
     // Nothing is asked of what is flat and shall be.
     let flat = [at("a", 0.0, &[5.0]), at("b", 1.0, &[5.0]), bent("k", 0.5, 0.0)];

@@ -211,3 +211,43 @@ fn an_answer_that_did_not_converge_moves_nothing() {
     let after = solver.solution();
     assert_eq!((before.notes(), before.coefficients()), (after.notes(), after.coefficients()));
 }
+
+#[test]
+fn an_answer_has_all_iterations_that_a_solution_has() {
+    // What the solution took was taken from the answers.
+    let with = |most_iterations: usize| {
+        let settings = Settings { method: Method::Bpx, most_iterations, ..Settings::default() };
+        let mut solver = Solver::new(problem(Boundary::Open, 1), settings).unwrap();
+        solver.finish().unwrap();
+        solver
+    };
+    let free = with(10_000);
+    let taken = free.solution().iterations();
+    assert!(taken > 5);
+    let mut solver = with(taken + 1);
+    assert!(solver.solution().converged());
+    let answer = solver.response("p3", 0).unwrap().unwrap();
+    let mut free = free;
+    assert_eq!(answer, free.response("p3", 0).unwrap().unwrap());
+    assert_eq!(solver.solution().iterations(), taken, "the solution's own");
+}
+
+#[test]
+fn other_targets_have_words_of_their_own() {
+    // Two points too near to be told apart, which others targets may make one.
+    let space = Space::curve(Axis::new(Boundary::Open, 16, [0.0, 1.0]).unwrap());
+    let with = |y: f64| {
+        let at = |id: &str, t: f64, y: f64| Constraint::new(id, &[t], Demand::Position(vec![Some(y)]));
+        let rows = vec![at("a", 0.0, 0.0), at("b", 0.5, 1.0), at("c", 0.5 + 5e-9, y), at("d", 1.0, 0.0)];
+        Problem::new(space.clone(), 1, Energy::BEND, None, rows).unwrap()
+    };
+    let cold = |y: f64| Solver::new(with(y), Settings::default()).and_then(Solver::run).unwrap();
+    let mut solver = Solver::new(with(1.0 + 4e-8), Settings::default()).unwrap();
+    for y in [1.0 + 4e-8, 1.0, 1.0 + 2e-8, 1.0] {
+        solver.retarget(with(y)).unwrap();
+        solver.finish().unwrap();
+        let (found, want) = (solver.solution(), cold(y));
+        assert_eq!((found.notes(), found.converged()), (want.notes(), want.converged()), "{y}");
+    }
+    assert_ne!(cold(1.0 + 4e-8).notes(), cold(1.0).notes());
+}

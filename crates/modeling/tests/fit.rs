@@ -72,6 +72,16 @@ fn a_long_domain_has_more_spans_along_than_across() {
 }
 
 #[test]
+fn rounding_on_a_very_long_domain_is_no_lack_of_convergence() {
+    // Cells of 4000 by 0.25: the stiffest shapes cost 1e30 times what the softest do.
+    let (places, heights) = wave(150, [1e6, 1.0]);
+    let given = FitSettings { weight: Some(4.6e7), stiffening: Some(316.0), ..FitSettings::default() };
+    let fit = surface(&Scatter::new(places, heights).unwrap(), given).unwrap();
+    assert_eq!(fit.space.axes().iter().map(|a| a.spans()).collect::<Vec<_>>(), [256, 4]);
+    assert!(fit.converged);
+}
+
+#[test]
 fn the_smoothing_of_a_long_domain_is_chosen_as_that_of_a_square_one() {
     // The same wave four times as long, with four times the points: as predictable as one square of it.
     let of = |i: u64| {
@@ -91,6 +101,31 @@ fn a_fit_that_does_not_converge_says_so() {
     let settings =
         FitSettings { weight: Some(1e-12), stiffening: Some(0.0), spans: Some(32), ..FitSettings::default() };
     assert!(!surface(&Scatter::new(places, heights).unwrap(), settings).unwrap().converged);
+}
+
+#[test]
+fn a_fit_that_hardly_smooths_is_right_or_says_that_it_is_not() {
+    // Coefficients were off by more than all heights together from weights of 1e-12 on, and the fit was content.
+    let (places, heights) = wave(150, [1.0, 1.0]);
+    let mean = heights.iter().sum::<f64>() / 150.0;
+    for power in [2, 4, 6, 7, 8, 9, 10, 11, 12, 13, 14, 16] {
+        let weight = 10.0_f64.powi(-power);
+        let settings =
+            FitSettings { weight: Some(weight), stiffening: Some(0.0), spans: Some(16), ..FitSettings::default() };
+        let fit = surface(&Scatter::new(places.clone(), heights.clone()).unwrap(), settings).unwrap();
+        let soft = |(i, (p, z)): (usize, (&[f64; 2], &f64))| {
+            Constraint::new(i.to_string(), p, Demand::Position(vec![Some(z - mean)])).soft(1.0 / weight)
+        };
+        let rows = places.iter().zip(&heights).enumerate().map(soft).collect();
+        let problem = Problem::new(fit.space.clone(), 1, Energy::BEND, None, rows).unwrap();
+        let want = Solver::new(problem, Settings::default()).and_then(Solver::run).unwrap();
+        assert!(want.converged(), "1e-{power}");
+        let pairs = fit.coefficients.iter().zip(&want.coefficients()[0]);
+        let off = pairs.fold(0.0, |m: f64, (a, b)| m.max((a - mean - b).abs()));
+        let size = want.coefficients()[0].iter().fold(0.0, |m: f64, b| m.max(b.abs()));
+        assert!(fit.converged || power > 9, "1e-{power}: off by {off:e} of {size:e}");
+        assert!(!fit.converged || off < 1e-4 * size, "1e-{power}: off by {off:e} of {size:e}");
+    }
 }
 
 #[test]
@@ -144,6 +179,36 @@ fn a_fair_curve_reaches_tolerances_far_below_the_noise_and_says_which_it_cannot(
     }
     let refused = fair(&points, 1e-18).unwrap_err();
     assert!(matches!(refused, FairError::Unreachable { .. }), "{refused}");
+}
+
+#[test]
+fn generous_tolerances_give_fair_curves_too() {
+    // Weights sank until no solver held the points, and the worst of those curves was the fairest by its energy.
+    let line: Vec<Vec<f64>> = (0..40).map(|i| vec![f64::from(i), 2.0 * f64::from(i)]).collect();
+    let rough: Vec<Vec<f64>> = line
+        .iter()
+        .zip(0..)
+        .map(|(p, i)| vec![p[0] + 0.02 * (random(6, i) - 0.5), p[1] + 0.02 * (random(7, i) - 0.5)])
+        .collect();
+    let wing: Vec<Vec<f64>> = (0..60)
+        .map(|i| {
+            let a = f64::from(i) / 59.0 * std::f64::consts::TAU;
+            let x = 0.5 * (1.0 + a.cos());
+            vec![x, a.sin().signum() * 0.6 * (0.297 * x.sqrt() - 0.126 * x - 0.351 * x * x + 0.18 * x.powi(3))]
+        })
+        .collect();
+    for (name, points) in [("line", &line), ("rough", &rough), ("wing", &wing)] {
+        for tolerance in [0.03, 0.1, 0.5, 1.5, 10.0] {
+            let found = fair(points, tolerance).unwrap();
+            assert!(found.curve.converged(), "{name} {tolerance}: {:?}", found.curve.notes());
+            assert!(found.largest_move <= tolerance, "{name} {tolerance}: {:e}", found.largest_move);
+            let energy = found.curve.energy();
+            assert!(
+                tolerance < 0.5 || energy < 1e-9,
+                "{name} {tolerance}: a parabola is as fair as can be, not {energy:e}"
+            );
+        }
+    }
 }
 
 #[test]

@@ -57,6 +57,8 @@ enum Outcome {
 fn judged(number: u64) -> Result<Outcome, String> {
     let (problem, bound) = random::problem(number);
     let full = match Solver::new(problem.clone(), Settings::default()).and_then(Solver::run) {
+        // Without a solution to compare with there is nothing to say.
+        Ok(full) if !full.converged() => return Ok(Outcome::Crowded),
         Ok(full) => full,
         Err(SolveError::Problem(_) | SolveError::Degenerate { .. }) => return Ok(Outcome::Crowded),
         Err(e) => return Err(format!("{number}: {e}")),
@@ -133,6 +135,41 @@ fn random_problems_end_without_a_state_coming_twice_and_within_the_bound() {
 }
 
 #[test]
+fn rows_too_crowded_for_any_solver_leave_a_shape_that_meets_them() {
+    // 34 of 37 rows on a fifth of both axes: what the least energy is no solver can say, which was an error.
+    let (problem, bound) = random::problem(6674);
+    let (_, found) = stepped(&problem, bound).unwrap();
+    assert!(!found.converged());
+    assert!(found.notes().iter().any(|n| n.contains("to compare with")), "{:?}", found.notes());
+    assert!(found.residuals().iter().all(|r| r.soft || r.miss.abs() < 1e-8));
+}
+
+#[test]
+fn heights_over_long_domains_are_as_near_the_least_energy() {
+    // The same problem in other units: rounding of the heights was taken for energy, up to 160 percent above the least.
+    let unit = |k: u64, i: u64| ondelette_numerics::seed::unit(ondelette_numerics::seed::combine(k, i));
+    for boundary in [Boundary::Open, Boundary::Mirrored] {
+        let mut sizes = Vec::new();
+        for side in [1e-3, 1.0, 1e5, 1e6, 1e9] {
+            let axis = Axis::new(boundary, 16, [0.0, side]).unwrap();
+            let point = |i: u64| {
+                let at = [side * unit(1, i), side * unit(2, i)];
+                Constraint::new(format!("{i}"), &at, Demand::Position(vec![Some(unit(3, i))]))
+            };
+            let problem =
+                Problem::new(Space::surface(axis, axis), 1, Energy::BEND, None, (0..8).map(point).collect()).unwrap();
+            let full = Solver::new(problem.clone(), Settings::default()).and_then(Solver::run).unwrap();
+            let few = Oracle::new(problem, 1e-3).and_then(Oracle::run).unwrap();
+            let over = few.energy() / full.energy() - 1.0;
+            assert!(few.converged(), "{boundary:?} {side}: {:?}", few.notes());
+            assert!((-1e-6..1e-3).contains(&over), "{boundary:?} {side}: {over:e}");
+            sizes.push(few.active().unwrap());
+        }
+        assert!(sizes.iter().all(|s| s.abs_diff(sizes[0]) <= 20), "{boundary:?}: {sizes:?}");
+    }
+}
+
+#[test]
 fn long_cells_keep_the_promise_too() {
     // Wavelets of long cells are far from each other's orthogonal: iterations were cut off, what single functions would
     // gain said little, and energies were up to 42 percent above the least.
@@ -190,8 +227,8 @@ fn heights_far_from_zero_are_as_near_the_least_energy() {
             let full = Solver::new(problem.clone(), settings).and_then(Solver::run).unwrap();
             let few = Oracle::new(problem, 1e-3).and_then(Oracle::run).unwrap();
             let over = few.energy() / full.energy() - 1.0;
-            assert!(few.converged() || tilt > 0.0, "{boundary:?} {offset} {tilt}: {:?}", few.notes());
-            assert!(!few.converged() || over.abs() < 1.1e-3, "{boundary:?} {offset} {tilt}: {over:e}");
+            assert!(few.converged(), "{boundary:?} {offset} {tilt}: {:?}", few.notes());
+            assert!(over.abs() < 1e-3, "{boundary:?} {offset} {tilt}: {over:e}");
             let size = offset.abs() + tilt + 1.0;
             assert!(few.residuals().iter().all(|r| r.miss.abs() < 1e-11 * size), "{boundary:?} {offset} {tilt}");
         }

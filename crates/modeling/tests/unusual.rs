@@ -63,6 +63,58 @@ fn slopes_and_images_alone_are_enough_for_every_solver() {
 }
 
 #[test]
+fn slopes_alone_are_enough_for_curves() {
+    let slope = |id: &str, t: f64, by: &[f64]| {
+        Constraint::new(id, &[t], Demand::Derivative(0, by.iter().copied().map(Some).collect()))
+    };
+    for boundary in [Boundary::Periodic, Boundary::Mirrored, Boundary::Open] {
+        for spans in [8, 16, 32, 128] {
+            let space = Space::curve(Axis::new(boundary, spans, [0.0, 1.0]).unwrap());
+            let energies = [Energy::BEND, Energy::new(1.0, 1.0, 0.0).unwrap(), Energy::new(0.0, 0.0, 1.0).unwrap()];
+            for (coordinates, energy) in [1, 2].into_iter().flat_map(|k| energies.map(|e| (k, e))) {
+                let rows = |soft: bool| {
+                    let rows =
+                        [slope("a", 0.3, &[1.0, 0.2][..coordinates]), slope("b", 0.7, &[-0.5, 0.4][..coordinates])];
+                    rows.map(|r| if soft { r.soft(1e3) } else { r }).to_vec()
+                };
+                for soft in [false, true] {
+                    let problem = Problem::new(space.clone(), coordinates, energy, None, rows(soft)).unwrap();
+                    let name = format!("{boundary:?} {spans} {energy:?} {coordinates} {soft}");
+                    let want = run(&problem, Method::Bpx);
+                    assert!(want.converged(), "{name}: {:?}", want.notes());
+                    let wavelet = (spans > 8).then_some(Method::Wavelet);
+                    for method in [Method::Auto, Method::Banded, Method::Cholesky].into_iter().chain(wavelet) {
+                        let found = run(&problem, method);
+                        assert!(found.converged(), "{name} {method}: {:?}", found.notes());
+                        // Parabolas have no third derivative.
+                        let over = (found.energy() - want.energy()).abs();
+                        assert!(over < 1e-6 * want.energy() + 1e-12, "{name} {method}: {over:e}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn many_soft_points_of_a_long_curve_are_solved_unasked() {
+    // A sparse factor has no digits left for the energy; that there were too many rows was said of surfaces.
+    let unit = |k: u64, i: u64| ondelette_numerics::seed::unit(ondelette_numerics::seed::combine(k, i));
+    for length in [1e9, 1e12] {
+        let space = Space::curve(Axis::new(Boundary::Open, 1024, [0.0, length]).unwrap());
+        let point = |i: u64| {
+            let to = Demand::Position(vec![Some((6.0 * i as f64 / 2600.0).sin() + 0.1 * unit(1, i))]);
+            Constraint::new(format!("{i}"), &[length * (i as f64 + unit(2, i)) / 2600.0], to).soft(1.0)
+        };
+        let problem = Problem::new(space, 1, Energy::BEND, None, (0..2600).map(point).collect()).unwrap();
+        let (want, found) = (run(&problem, Method::Banded), run(&problem, Method::Auto));
+        let over = found.energy() / want.energy() - 1.0;
+        assert!(want.converged() && found.converged(), "{length:e}: {:?}", found.notes());
+        assert!(over.abs() < 1e-6, "{length:e}: {over:e}");
+    }
+}
+
+#[test]
 fn a_coordinate_that_is_zero_is_as_good_as_any() {
     let at = |id: &str, t: f64, x: f64, y: f64| Constraint::new(id, &[t], Demand::Position(vec![Some(x), Some(y)]));
     // What is soft would pull y away from zero, but is at a point that is held there.

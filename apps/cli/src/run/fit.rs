@@ -46,9 +46,8 @@ pub(crate) fn run(plan: &FitPlan) -> Result<Outcome, Refusal> {
     if converged {
         return Ok(Outcome::Done);
     }
-    tell(match (plan.fair, plan.weight) {
-        (true, _) => "not converged: give a larger tolerance",
-        (_, Some(weight)) if weight > 1.0 => "not converged: give a smaller weight",
+    tell(match plan.weight {
+        Some(weight) if weight > 1.0 => "not converged: give a smaller weight",
         _ => "not converged: give fewer spans, a larger weight, or a stiffening above 0",
     });
     Ok(Outcome::Unfinished)

@@ -2,7 +2,8 @@
 //!
 //! Numbers are taken as they stand; SVG's y points down. Files written here of curves whose y points up say so (a
 //! mirrored group that readers elsewhere show the right way up, marked with `data-ondelette-y`), so nothing is ever
-//! turned over.
+//! turned over: y of all that is in such a group points up in the picture as others left it, and so does y of what
+//! others put beside it.
 
 use super::shortest;
 use ondelette_modeling::free::{Fit, FreeCurve, FreePath, Knots};
@@ -24,6 +25,8 @@ pub const MOST: f64 = 1e9;
 
 /// An affine map, `[a b c d e f]` as in SVG.
 type Matrix = [f64; 6];
+
+const IDENTITY: Matrix = [1.0, 0.0, 0.0, 1.0, 0.0, 0.0];
 
 /// From y down to y up and back.
 const MIRROR: Matrix = [1.0, 0.0, 0.0, -1.0, 0.0, 0.0];
@@ -55,25 +58,24 @@ pub fn read(text: &str) -> Result<SvgPaths, String> {
     let options = roxmltree::ParsingOptions { allow_dtd: true, nodes_limit: 1 << 22, ..Default::default() };
     let document = roxmltree::Document::parse_with_options(text, options).map_err(|e| format!("no SVG: {e}"))?;
     let mut out = SvgPaths { path: FreePath::default(), y_down: true };
+    let mut ordinary = Vec::new();
     // Document order with the map from the root to each element, without recursion.
-    let mut stack = vec![(document.root_element(), [1.0, 0.0, 0.0, 1.0, 0.0, 0.0])];
-    while let Some((node, outer)) = stack.pop() {
+    let mut stack = vec![(document.root_element(), IDENTITY, false)];
+    while let Some((node, outer, up)) = stack.pop() {
         let name = node.tag_name().name();
         if matches!(name, "defs" | "clipPath" | "mask" | "symbol" | "pattern" | "marker") {
             continue;
         }
         let mut map = outer;
-        let up = node.attribute("data-ondelette-y") == Some("up");
         if let Some(text) = node.attribute("transform") {
             map = product(&outer, &path::transform(text)?);
-        } else if up {
-            map = product(&outer, &MIRROR);
         }
-        if up {
-            // Where others moved the group, or a group around it, the picture is what they moved.
-            out.y_down = false;
+        // Where others moved the group, or a group around it, the picture is what they moved.
+        let turns = !up && node.attribute("data-ondelette-y") == Some("up");
+        if turns {
             map = product(&MIRROR, &map);
         }
+        let up = up || turns;
         let line = || document.text_pos_at(node.range().start).row;
         let data = match name {
             "path" => node.attribute("d").map(str::to_owned),
@@ -84,11 +86,19 @@ pub fn read(text: &str) -> Result<SvgPaths, String> {
         if let Some(data) = data {
             let pieces = path::parse(&data).map_err(|e| format!("line {}: {e}", line()))?;
             for piece in pieces {
+                out.y_down &= !up;
+                ordinary.push(!up);
                 out.path.parts.push(curve(&piece, &map).map_err(|e| format!("line {}: {e}", line()))?);
             }
         }
         let children: Vec<_> = node.children().filter(roxmltree::Node::is_element).collect();
-        stack.extend(children.into_iter().rev().map(|c| (c, map)));
+        stack.extend(children.into_iter().rev().map(|c| (c, map, up)));
+    }
+    if !out.y_down {
+        // One file has one direction of y.
+        for part in out.path.parts.iter_mut().zip(ordinary).filter(|p| p.1).map(|p| p.0) {
+            *part = mirrored(part)?;
+        }
     }
     if out.path.parts.is_empty() { Err("the file has no path, polyline or polygon".to_owned()) } else { Ok(out) }
 }
@@ -103,6 +113,12 @@ fn curve(points: &[[f64; 2]], m: &Matrix) -> Result<FreeCurve, String> {
     let breaks: Vec<f64> = (0..=points.len() / 3).map(|i| i as f64).collect();
     let knots = Knots::bezier(3, &breaks).map_err(|e| e.to_string())?;
     FreeCurve::new(2, knots, mapped, None).map_err(|e| e.to_string())
+}
+
+/// The same curve with y the other way.
+fn mirrored(of: &FreeCurve) -> Result<FreeCurve, String> {
+    let points = of.points().iter().map(|p| [p[0], -p[1], p[2]]).collect();
+    FreeCurve::new(2, of.knots().clone(), points, None).map_err(|e| e.to_string())
 }
 
 /// The `d` of a path: each span of each part as one cubic, exact for degree 3 and below without weights; others by a

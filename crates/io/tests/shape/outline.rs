@@ -179,7 +179,21 @@ fn a_curve_whose_y_points_up_may_be_moved_in_the_picture() {
     };
     let as_written = svg("", "transform='scale(1,-1)'");
     assert_eq!(as_written, [[0.0, 0.0], [0.0, 1.0], [1.0, 1.0], [1.0, 0.0]]);
-    assert_eq!(svg("", ""), as_written);
+    // Editors move the mirror to the path itself, or into its numbers: the picture is the same.
+    for path in ["transform='scale(1,-1)' d='M0 0C0 1 1 1 1 0'", "d='M0 0C0 -1 1 -1 1 0'"] {
+        let text = format!(
+            "<svg xmlns='http://www.w3.org/2000/svg'><g data-ondelette-y='up'>\
+             <g data-ondelette-y='up'><path {path}/></g></g><path d='M0 3L1 4'/></svg>"
+        );
+        let read = svg::read(&text).unwrap();
+        let points = |k: usize| read.path.parts[k].points().iter().map(|p| [p[0], p[1]]).collect::<Vec<[f64; 2]>>();
+        assert!(!read.y_down);
+        assert_eq!(points(0), as_written, "{path}");
+        // What is beside it in the file stays beside it.
+        assert_eq!((points(1)[0], points(1).last()), ([0.0, -3.0], Some(&[1.0, -4.0])));
+        let again = svg::read(&svg::write(&read.path, read.y_down, 1e-9).unwrap()).unwrap();
+        assert_eq!((again.path, again.y_down), (read.path, false));
+    }
     // An editor moves the picture 100 right and 200 down.
     let moved = [[100.0, -200.0], [100.0, -199.0], [101.0, -199.0], [101.0, -200.0]];
     assert_eq!(svg("", "transform='matrix(1,0,0,-1,100,200)'"), moved);

@@ -14,8 +14,30 @@ pub(crate) struct Seen {
     two: Functional,
     d1: Vec<f64>,
     d2: Vec<f64>,
+    /// The curvature that rounding alone makes of heights, which may lie far from zero.
+    noise: f64,
     /// Curvature and its gradients by the first and second derivative; `None` where the tangent has collapsed.
     found: Option<(f64, Vec<f64>, Vec<f64>)>,
+}
+
+/// What holds a curvature constraint.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Force {
+    None,
+    /// Along its curvature.
+    One(f64),
+    /// Along both directions across the tangent.
+    Two([f64; 2]),
+}
+
+impl Force {
+    pub(crate) fn size(self) -> f64 {
+        match self {
+            Force::None => 0.0,
+            Force::One(force) => force,
+            Force::Two([a, b]) => f64::hypot(a, b),
+        }
+    }
 }
 
 /// Curvature with its gradients by the first and second derivative; `None` where the tangent vanishes.
@@ -132,14 +154,15 @@ impl Seen {
         self.found.as_ref().map(|f| f.0 - self.want).filter(|m| m.is_finite())
     }
 
-    /// What a miss is judged by, for a shape of some [`usual`] curvature.
-    pub(crate) fn unit(&self, usual: f64) -> f64 {
-        self.want.abs().max(usual)
+    /// The miss that is as good as none, with a share of the curvature wanted, or of the [`usual`] one of the shape.
+    pub(crate) fn allowed(&self, share: f64, usual: f64) -> f64 {
+        (share * self.want.abs().max(usual)).max(self.noise)
     }
 
     /// The hard row around this curve, and soft ones that hold the derivatives where `force` times the curvature bends
-    /// upwards: the part of Newton's matrix that may be added to the energy without losing its least.
-    pub(crate) fn rows(&self, force: f64, out: &mut Vec<Row>) {
+    /// upwards: the part of Newton's matrix that may be added to the energy without losing its least. Next to straight
+    /// beside the [`usual`] curvature of the shape, in space: two hard rows.
+    pub(crate) fn rows(&self, force: Force, usual: f64, out: &mut Vec<Row>) {
         let Some((k, by1, by2)) = &self.found else { return };
         let n = self.d1.len();
         let terms = |first: &[f64], second: &[f64]| {
@@ -150,13 +173,23 @@ impl Seen {
         let value = |first: &[f64], second: &[f64]| -> f64 {
             (0..n).map(|i| first[i] * self.d1[i] + second[i] * self.d2[i]).sum()
         };
-        if n == 3 && self.want == 0.0 {
-            for (k, by1, by2) in parts(&self.d1, &self.d2) {
-                out.extend(Row::new(self.constraint, terms(&by1, &by2), value(&by1, &by2) - k, None));
+        if n == 3 && self.want.abs() <= STRAIGHT * usual {
+            // It bends the way it is pulled; at first, the way it is bent.
+            let both = parts(&self.d1, &self.d2);
+            let pull = match force {
+                Force::Two(pull) => pull,
+                _ => [both[0].0, both[1].0],
+            };
+            let size = f64::hypot(pull[0], pull[1]);
+            for ((k, by1, by2), pull) in both.into_iter().zip(pull) {
+                let toward = if size > 0.0 { pull / size } else { std::f64::consts::FRAC_1_SQRT_2 };
+                let target = self.want * toward - k + value(&by1, &by2);
+                out.extend(Row::new(self.constraint, terms(&by1, &by2), target, None));
             }
             return;
         }
         out.extend(Row::new(self.constraint, terms(by1, by2), self.want - k + value(by1, by2), None));
+        let force = force.size();
         if force == 0.0 {
             return;
         }
@@ -185,8 +218,15 @@ fn length_of(f: &Functional) -> f64 {
     f.entries().map(|(_, v)| v * v).sum::<f64>().sqrt()
 }
 
+/// Places in space with less than this share of the usual curvature are about straight: its size has a kink there,
+/// which one row around it knows nothing of.
+const STRAIGHT: f64 = 2e-5;
+
 /// A first derivative that is this share of what coefficients of the shape's size could give is none.
 const COLLAPSED: f64 = 1e-13;
+
+/// Sums of coefficients are rounded to this share of the sum of their sizes.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 /// All curvature constraints at the curve with the given coefficients.
 pub(crate) fn look(problem: &Problem, coefficients: &[Vec<f64>]) -> Vec<Seen> {
@@ -203,7 +243,11 @@ pub(crate) fn look(problem: &Problem, coefficients: &[Vec<f64>]) -> Vec<Seen> {
         let speed = d1.iter().map(|v| v * v).sum::<f64>().sqrt();
         let collapsed = d1.len() > 1 && speed <= COLLAPSED * size * length_of(&one);
         let found = curvature(&d1, &d2).filter(|_| !collapsed);
-        out.push(Seen { constraint, want, one, two, d1, d2, found });
+        let noise = match coefficients {
+            [x] => ROUNDING * two.entries().map(|(i, v)| (v * x[i]).abs()).sum::<f64>(),
+            _ => 0.0,
+        };
+        out.push(Seen { constraint, want, one, two, d1, d2, noise, found });
     }
     out
 }
@@ -230,7 +274,12 @@ pub(crate) fn usual(problem: &Problem, coefficients: &[Vec<f64>]) -> f64 {
     let even = 1.0 / (0..n.saturating_sub(1)).map(step).sum::<f64>();
     let [height] = coefficients else { return even };
     let side = axis.domain()[1] - axis.domain()[0];
-    even.min(height.iter().fold(0.0, |m: f64, v| m.max(v.abs())) / side / side)
+    let (low, high) = range(height);
+    even.min((high - low) / side / side)
+}
+
+fn range(of: &[f64]) -> (f64, f64) {
+    of.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)))
 }
 
 #[cfg(test)]

@@ -15,7 +15,7 @@ use ondelette_wavelet::Boundary;
 /// A fair curve and the points on it.
 #[derive(Clone, Debug)]
 pub struct Fair {
-    /// The curve: open, over [0, 1] by chord length; it says whether the solver converged.
+    /// The curve: open, over [0, 1] by chord length.
     pub curve: Solution,
     /// Parameter of each point.
     pub parameters: Vec<f64>,
@@ -53,7 +53,8 @@ impl From<ConstraintError> for FairError {
     }
 }
 
-/// Evens the curvature of a polygon of measured points without moving a point further than `tolerance`.
+/// Evens the curvature of a polygon of measured points without moving a point further than `tolerance`: less where
+/// weights light enough to use it up are lost beside the energy.
 ///
 /// # Errors
 /// [`FairError`].
@@ -96,7 +97,7 @@ pub fn fair(points: &[Vec<f64>], tolerance: f64) -> Result<Fair, FairError> {
     };
     let most = |m: &[f64]| m.iter().fold(0.0, |a: f64, b| a.max(*b));
     let mut shares = vec![1.0; points.len()];
-    let mut best: Option<(f64, Solution)> = None;
+    let (mut first, mut best): (Option<Solution>, Option<(f64, Solution)>) = (None, None);
     let mut middle = 4.0_f64;
     let mut map = None;
     let mut nearest = f64::INFINITY;
@@ -111,8 +112,12 @@ pub fn fair(points: &[Vec<f64>], tolerance: f64) -> Result<Fair, FairError> {
                 let weights: Vec<f64> = shares.iter().map(|s| s * 10.0_f64.powf(w)).collect();
                 let curve = solve(&weights, &map)?;
                 let m = moves(&curve);
-                nearest = nearest.min(most(&m));
-                if most(&m) <= tolerance {
+                // Weights too light for the solver are too light.
+                let good = curve.converged() && most(&m) <= tolerance;
+                if curve.converged() {
+                    nearest = nearest.min(most(&m));
+                }
+                if good {
                     high = w;
                     found = Some((curve, m));
                 } else {
@@ -129,6 +134,7 @@ pub fn fair(points: &[Vec<f64>], tolerance: f64) -> Result<Fair, FairError> {
         if round == 0 {
             // From here on curvature counts in proportion: a nose may stay sharp.
             map = softened(&curve, spans);
+            first = Some(curve);
             continue;
         }
         let energy = curve.energy();
@@ -139,7 +145,7 @@ pub fn fair(points: &[Vec<f64>], tolerance: f64) -> Result<Fair, FairError> {
             *s = (*s * (0.05 + m / tolerance)).clamp(1e-9, 1e9);
         }
     }
-    let Some((_, curve)) = best else { return Err(FairError::Unreachable { tolerance, nearest }) };
+    let Some(curve) = best.map(|b| b.1).or(first) else { return Err(FairError::Unreachable { tolerance, nearest }) };
     let largest_move = most(&moves(&curve));
     let moved = parameters.iter().map(|t| curve.eval(&[*t], [0, 0])).collect();
     Ok(Fair { curve, parameters, points: moved, largest_move })

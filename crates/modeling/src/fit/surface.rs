@@ -207,7 +207,7 @@ pub fn surface(data: &Scatter, settings: FitSettings) -> Result<Fit, FitError> {
     if let Some(start) = start.filter(|x| x.len() == all.x.len()) {
         all.x = start;
     }
-    let converged = whole.solve(&mut all, weight, stiffening, 1e-8, MOST)?;
+    let converged = whole.settle(&mut all, weight, stiffening)?;
     let miss = |i: usize| eval(&space, &all.x, data.points[i]) - whole.values[i];
     let rms = ((0..m).map(|i| miss(i).powi(2)).sum::<f64>() / m as f64).sqrt();
     // The B-splines sum to one.
@@ -217,6 +217,12 @@ pub fn surface(data: &Scatter, settings: FitSettings) -> Result<Fit, FitError> {
 
 /// Most iterations of the final solution. Ten to fifty are usual; weights that hardly smooth take more.
 const MOST: usize = 2000;
+/// The sum may be above its least by this share of the energy.
+const SETTLED: f64 = 1e-8;
+/// Where rounding keeps the sum up, this many times the share will do.
+const SLACK: f64 = 1e3;
+/// Coefficients are rounded to this share of their size.
+const ROUNDING: f64 = 1e-15;
 /// An energy whose largest entry is this share of the data's is lost in their rounding.
 const DROWNED: f64 = 1e-18;
 /// Values above this have squares whose sums may be no numbers.
@@ -335,14 +341,7 @@ impl Part {
         self.folds = (0..count as u64).map(|k| self.fold(&|i| number(i) == k)).collect();
     }
 
-    fn solve(
-        &self,
-        fold: &mut Fold,
-        weight: f64,
-        stiffening: f64,
-        tolerance: f64,
-        most: usize,
-    ) -> Result<bool, FitError> {
+    fn prepare(&self, fold: &Fold, weight: f64, stiffening: f64) -> Result<(Operator, Cycle), FitError> {
         let ratio = stiffening / self.side;
         let energy = Energy::new(weight * ratio * ratio, weight, 0.0)?;
         let h = Operator::new(&self.spaces[0], &energy, None);
@@ -351,10 +350,36 @@ impl Part {
         if !(own > DROWNED * data && own.is_finite()) {
             return Err(FitError::Lost { weight, stiffening });
         }
-        let Some(mut cycle) = Cycle::with_data(&self.spaces[0], &energy, &h, &fold.normals) else {
-            return Err(FitError::Lost { weight, stiffening });
+        let cycle = Cycle::with_data(&self.spaces[0], &energy, &h, &fold.normals);
+        Ok((h, cycle.ok_or(FitError::Lost { weight, stiffening })?))
+    }
+
+    /// For cross-validation.
+    fn solve(&self, fold: &mut Fold, weight: f64, stiffening: f64) -> Result<(), FitError> {
+        let (_, mut cycle) = self.prepare(fold, weight, stiffening)?;
+        cycle.conjugate_gradients(&fold.right, &mut fold.x, 1e-4, 200);
+        Ok(())
+    }
+
+    /// The last word, from all points; false where it does not converge.
+    ///
+    /// What the sum may be above its least is measured by the energy: misses alone would leave free what no point is
+    /// near. Beside it counts the energy of a shape that is bent evenly over the domain, as high as the data, because
+    /// planes have none.
+    fn settle(&self, fold: &mut Fold, weight: f64, stiffening: f64) -> Result<bool, FitError> {
+        let (h, mut cycle) = self.prepare(fold, weight, stiffening)?;
+        let squares: f64 = self.values.iter().map(|v| v * v).sum();
+        let even = weight * (1.0 + stiffening * stiffening) * squares / self.values.len() as f64;
+        let even = even / (self.side * self.side);
+        let trace = h.diagonal().iter().sum::<f64>() + fold.normals[0].diagonal().sum::<f64>();
+        let goal = |x: &[f64]| {
+            let miss = |(p, v): (&[f64; 2], &f64)| (eval(&self.spaces[0], x, *p) - v).powi(2);
+            let misses: f64 = self.points.iter().zip(&self.values).map(miss).sum();
+            let energy = h.energy(x);
+            let size = x.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+            (SETTLED * (misses + energy).min(energy.max(even))).max((ROUNDING * size).powi(2) * trace)
         };
-        Ok(cycle.conjugate_gradients(&fold.right, &mut fold.x, tolerance, most))
+        Ok(cycle.settle(&fold.right, &mut fold.x, 1e-8, MOST, &goal, SLACK))
     }
 
     /// Root mean square of the predictions of what all folds leave out.
@@ -374,7 +399,7 @@ impl Part {
         let mut folds = std::mem::take(&mut self.folds);
         for fold in &mut folds {
             // From the solution of the last weights: neighbours are alike.
-            self.solve(fold, weight, stiffening, 1e-4, 200)?;
+            self.solve(fold, weight, stiffening)?;
             for &i in &fold.out {
                 sum += (eval(&self.spaces[0], &fold.x, self.points[i]) - self.values[i]).powi(2);
                 count += 1;

@@ -100,8 +100,8 @@ pub(crate) fn spare(problem: &Problem, chosen: Method) -> Option<(Method, &'stat
         Method::Multigrid if space.len() * problem.coordinates() <= LARGE => {
             Some((Method::Cholesky, "a surface with very many constraints, too uneven for multigrid"))
         }
-        Method::Cholesky if rows(problem) > CROWD => None,
         Method::Cholesky if space.is_curve() => Some((Method::Banded, "a curve with crowded constraints")),
+        Method::Cholesky if rows(problem) > CROWD => None,
         Method::Cholesky if bpx::coarsest(space).len() <= bpx::MOST => {
             Some((Method::Bpx, "constraints too crowded for a sparse factor"))
         }

@@ -15,6 +15,9 @@ use std::sync::Arc;
 
 const BAND: usize = 3;
 
+/// Rows that see less than this share of a shape apart from others do not see it.
+const UNSEEN: f64 = 1e-13;
+
 /// A Cholesky factor of a matrix of half bandwidth 3, cyclic or not.
 #[derive(Clone, Debug)]
 pub(crate) struct BandFactor {
@@ -183,6 +186,26 @@ impl Green for BandGreen {
     }
 }
 
+/// True where the rows of one coordinate see all of the null space: what they see of its shapes, made orthogonal, is
+/// more than rounding. (A factor would not tell: its last pivots are rounding, above zero or below.)
+fn holds(structure: &Structure, null: Vec<Vec<f64>>) -> bool {
+    let mut seen: Vec<Vec<f64>> = Vec::new();
+    null.iter().all(|z| {
+        let mut y = structure.sight(0, z);
+        let size = dot(&y, &y).sqrt();
+        for _ in 0..2 {
+            for q in &seen {
+                let by = dot(q, &y);
+                y.iter_mut().zip(q).for_each(|(y, q)| *y -= by * q);
+            }
+        }
+        let rest = dot(&y, &y).sqrt();
+        y.iter_mut().for_each(|y| *y /= rest);
+        seen.push(y);
+        rest > UNSEEN * size
+    })
+}
+
 /// The solver of one coordinate whose rows each have one place.
 pub(crate) struct Banded {
     structure: Arc<Structure>,
@@ -198,9 +221,9 @@ pub(crate) struct Banded {
 
 impl Banded {
     /// `None` where rows couple places or coordinates, or leave part of the null space free; then [`BandGreen`] serves.
-    pub(crate) fn new(h: &Operator, structure: Arc<Structure>) -> Option<Banded> {
+    pub(crate) fn new(h: &Operator, structure: Arc<Structure>, free: usize) -> Option<Banded> {
         let [line] = &h.lines[..] else { return None };
-        if structure.k != 1 || !structure.is_separable() {
+        if structure.k != 1 || !structure.is_separable() || !holds(&structure, h.null_space(free)) {
             return None;
         }
         let cyclic = line.boundary == ondelette_wavelet::Boundary::Periodic;

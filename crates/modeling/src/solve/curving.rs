@@ -9,7 +9,8 @@
 
 use super::auto::fits;
 use super::refine::{SolveError, Solver, Stage, fresh_sides};
-use crate::constraint::{Demand, Row, curvature};
+use crate::constraint::curvature::{self, Force};
+use crate::constraint::{Demand, Row};
 use crate::energy::Hessian;
 use crate::system::ProblemError;
 use std::sync::Arc;
@@ -108,7 +109,7 @@ impl Solver {
     /// Moves along the way to `to` as far as the merit allows; false where no step is good.
     fn advance_shape(&self, curving: &mut Curving, to: &[Vec<f64>]) -> bool {
         for (price, force) in curving.price.iter_mut().zip(self.forces()) {
-            let least = DEAR * force.abs();
+            let least = DEAR * force.size().abs();
             *price = least.max(0.5 * (*price + least));
         }
         let way: Vec<Vec<f64>> =
@@ -156,8 +157,9 @@ impl Solver {
         let forces = self.forces();
         let mut rows = self.problem.rows();
         let linear = rows.len();
+        let usual = curvature::usual(&self.problem, &curving.from);
         for (seen, force) in curvature::look(&self.problem, &curving.from).iter().zip(forces) {
-            seen.rows(force, &mut rows);
+            seen.rows(force, usual, &mut rows);
         }
         // What bends next to nothing only makes factors worse.
         let most = self.h.trace() / self.problem.space().len() as f64 * FAINT;
@@ -204,23 +206,27 @@ impl Solver {
             }
         }
         self.converged = false;
-        self.notes.push(format!("curvature: {} steps did not settle", self.newton));
+        if self.newton > 0 {
+            self.notes.push(format!("curvature: {} steps did not settle", self.newton));
+        }
         self.judge_curvature();
         false
     }
 
-    /// What holds each curvature constraint, by the last solution.
-    fn forces(&self) -> Vec<f64> {
+    /// What holds each curvature constraint, by the last solution: about straight places in space have two rows.
+    fn forces(&self) -> Vec<Force> {
         let is_curvature = |c: &usize| matches!(self.problem.constraints()[*c].demand, Demand::Curvature(_));
         let numbers: Vec<usize> = (0..self.problem.constraints().len()).filter(is_curvature).collect();
-        let mut forces = vec![0.0; numbers.len()];
+        let mut forces = vec![Force::None; numbers.len()];
         for ((structure, block), states) in self.blocks.iter().zip(&self.sides) {
             for (side, state) in block.sides.iter().zip(states) {
                 for (r, c) in side.constraints.iter().enumerate().filter(|(r, _)| structure.give[*r] == 0.0) {
                     if let Ok(at) = numbers.binary_search(c) {
-                        // Straight places in space have two rows.
                         let force = state.multipliers[r] / structure.lengths[r];
-                        forces[at] = if forces[at] == 0.0 { force } else { f64::hypot(forces[at], force) };
+                        forces[at] = match forces[at] {
+                            Force::One(first) => Force::Two([first, force]),
+                            _ => Force::One(force),
+                        };
                     }
                 }
             }
@@ -237,7 +243,7 @@ impl Solver {
         let usual = curvature::usual(&self.problem, shape);
         let seen = curvature::look(&self.problem, shape);
         let most = self.settings.tolerance.max(1e-12);
-        misses.iter().zip(seen).all(|(m, s)| m.abs() <= most * s.unit(usual))
+        misses.iter().zip(seen).all(|(m, s)| m.abs() <= s.allowed(most, usual))
     }
 
     /// Energy with that of the soft rows.

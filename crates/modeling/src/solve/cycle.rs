@@ -277,43 +277,6 @@ impl Cycle {
         self.levels.is_empty()
     }
 
-    /// Conjugate gradients on (H + data) x = b from the given x, to a relative residual (in the cycle's norm). False
-    /// where `most` iterations, or the digits of the numbers, do not suffice.
-    pub(crate) fn conjugate_gradients(&mut self, b: &[f64], x: &mut [f64], tolerance: f64, most: usize) -> bool {
-        if self.is_direct() {
-            self.cycle(b, x);
-            return true;
-        }
-        let n = b.len();
-        let (mut r, mut z, mut p, mut hp) = (vec![0.0; n], vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-        self.cycle(b, &mut z);
-        let goal = dot(b, &z) * tolerance * tolerance;
-        self.apply(x, &mut hp);
-        r.iter_mut().zip(b).zip(&hp).for_each(|((r, b), h)| *r = b - h);
-        self.cycle(&r, &mut z);
-        let mut rz = dot(&r, &z);
-        p.copy_from_slice(&z);
-        for _ in 0..most {
-            if rz <= goal || rz.is_nan() {
-                break;
-            }
-            self.apply(&p, &mut hp);
-            let curvature = dot(&p, &hp);
-            if curvature <= 0.0 || !curvature.is_finite() {
-                break;
-            }
-            let alpha = rz / curvature;
-            x.iter_mut().zip(&p).for_each(|(x, p)| *x += alpha * p);
-            r.iter_mut().zip(&hp).for_each(|(r, h)| *r -= alpha * h);
-            self.cycle(&r, &mut z);
-            let old = rz;
-            rz = dot(&r, &z);
-            let beta = rz / old;
-            p.iter_mut().zip(&z).for_each(|(p, z)| *p = z + beta * *p);
-        }
-        rz <= goal
-    }
-
     /// Coefficients of the finest level, one coordinate.
     pub(crate) fn len(&self) -> usize {
         self.levels.first().map_or(self.coarse.len() / self.k, |l| l.n)

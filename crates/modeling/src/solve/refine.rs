@@ -5,6 +5,7 @@ use super::banded::{BandGreen, Banded};
 use super::bpx::Bpx;
 use super::correct::Correct;
 use super::curving::Curving;
+use super::dropped::{Dropped, notes};
 use super::green::Green;
 use super::method::{Method, Settings};
 use super::multigrid::{CycleGreen, Multigrid};
@@ -18,7 +19,7 @@ use super::verdict;
 use super::wavelet::WaveletGreen;
 use crate::constraint::curvature;
 use crate::energy::{Operator, Scratch};
-use crate::system::{Block, Problem, ProblemError, Redundant, Structure};
+use crate::system::{Block, Problem, ProblemError, Structure};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -95,12 +96,7 @@ pub struct Solver {
     pub(super) h: Arc<Operator>,
     pub(super) blocks: Vec<(Arc<Structure>, Block)>,
     pub(super) notes: Vec<String>,
-    /// Constraints with rows that were left out because they follow from others.
-    pub(super) followers: Vec<usize>,
-    /// Constraints with rows that were left out though they are missed, which the notes say.
-    pub(super) left_out: Vec<usize>,
-    /// Constraints that take part in rows that were left out.
-    tied: BTreeSet<usize>,
+    pub(super) dropped: Dropped,
     /// One a block, kept for other targets.
     pub(super) correctors: Vec<Option<Box<dyn Correct>>>,
     pub(super) at: (usize, usize),
@@ -146,13 +142,8 @@ impl Solver {
         let (method, why) = choose(&problem, &h, settings.method)?;
         blocks.iter().try_for_each(|b| fits(&b.structure, method))?;
         let spare = if settings.method == Method::Auto { spare(&problem, method) } else { None };
+        let dropped = Dropped::new(&redundant);
         let notes = notes(&problem, &redundant);
-        let sorted = |missed: bool| -> Vec<usize> {
-            let of = redundant.iter().filter(|r| r.miss.is_some() == missed).map(|r| r.constraint);
-            of.collect::<BTreeSet<usize>>().into_iter().collect()
-        };
-        let (followers, left_out) = (sorted(false), sorted(true));
-        let tied = redundant.iter().flat_map(|r| r.others.iter().copied().chain([r.constraint])).collect();
         let sides = fresh_sides(&blocks);
         let blocks: Vec<(Arc<Structure>, Block)> =
             blocks.into_iter().map(|b| (Arc::new(b.structure.clone()), b)).collect();
@@ -166,9 +157,7 @@ impl Solver {
             correctors: (0..blocks.len()).map(|_| None).collect(),
             blocks,
             notes,
-            followers,
-            left_out,
-            tied,
+            dropped,
             at: (0, 0),
             sides,
             stage: Stage::Residual,
@@ -333,7 +322,7 @@ impl Solver {
 
     /// Names of the constraints that take part in redundant rows: what holds one holds the others.
     pub(crate) fn tied(&self) -> BTreeSet<String> {
-        self.tied.iter().map(|c| self.problem.constraints()[*c].id.clone()).collect()
+        self.dropped.tied.iter().map(|c| self.problem.constraints()[*c].id.clone()).collect()
     }
 
     /// The coefficients so far, coordinate by coordinate; while curvature is being met, those of the last whole step.
@@ -373,7 +362,7 @@ impl Solver {
                 Box::new(Spectral::new(&self.h).ok_or_else(|| unfit("it needs mirrored or periodic axes"))?)
             }
             Method::Banded => {
-                if let Some(banded) = Banded::new(&self.h, structure.clone()) {
+                if let Some(banded) = Banded::new(&self.h, structure.clone(), energy.free_degree()) {
                     return Ok(Box::new(banded));
                 }
                 let green = BandGreen::new(&self.h, energy.free_degree());
@@ -381,9 +370,8 @@ impl Solver {
             }
             Method::Cholesky => {
                 let solver = SparseSolver::new(&self.h, structure, energy.free_degree());
-                return Ok(Box::new(
-                    solver.ok_or_else(|| unfit("the matrix has no factor; do weights differ too much?"))?,
-                ));
+                let why = "weights are too large beside the energy, which is little on a long domain";
+                return Ok(Box::new(solver.ok_or_else(|| unfit(why))?));
             }
             Method::Multigrid if structure.rows() <= auto::CYCLES || space.is_curve() => {
                 let green = CycleGreen::new(space, energy, map, &self.h);
@@ -438,20 +426,6 @@ impl Solver {
         );
         solution.begun_if(begun)
     }
-}
-
-/// What is said of redundant rows.
-pub(crate) fn notes(problem: &Problem, redundant: &[Redundant]) -> Vec<String> {
-    let name = |c: &usize| problem.constraints()[*c].id.clone();
-    let of = |r: &Redundant| {
-        let others: Vec<String> = r.others.iter().take(8).map(name).collect();
-        let (own, others) = (name(&r.constraint), others.join(", "));
-        match r.miss {
-            None => format!("constraint {own} follows from {others}: redundant"),
-            Some(miss) => format!("constraint {own} cannot be told from {others}: left out, missed by {miss:.1e}"),
-        }
-    };
-    redundant.iter().map(of).collect()
 }
 
 pub(crate) fn fresh_sides(blocks: &[Block]) -> Vec<Vec<SideState>> {

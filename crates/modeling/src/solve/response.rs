@@ -1,5 +1,6 @@
 //! What a solver's factors are kept for: other targets of the same constraints, and the answer to one of them.
 
+use super::dropped::{Dropped, notes};
 use super::refine::{SolveError, Solver, Stage, fresh_sides};
 use crate::constraint::Demand;
 use crate::system::Problem;
@@ -10,7 +11,7 @@ impl Solver {
     /// # Errors
     /// The problem differs in more than targets ([`SolveError::Method`] says so), or its constraints conflict.
     pub fn retarget(&mut self, problem: Problem) -> Result<(), SolveError> {
-        let (blocks, _) = problem.blocks(problem.rows())?;
+        let (blocks, redundant) = problem.blocks(problem.rows())?;
         let same = blocks.len() == self.blocks.len()
             && self.newton == 0
             && blocks.iter().zip(&self.blocks).all(|(new, (old, block))| {
@@ -32,6 +33,9 @@ impl Solver {
         for ((_, old), new) in self.blocks.iter_mut().zip(blocks) {
             *old = new;
         }
+        // What was said was about the old targets.
+        self.dropped = Dropped::new(&redundant);
+        self.notes = notes(&problem, &redundant);
         self.problem = problem;
         self.at = (0, 0);
         self.stage = Stage::Residual;
@@ -74,6 +78,8 @@ impl Solver {
         self.at = (b, s);
         self.converged = true;
         self.stage = Stage::Residual;
+        // The limit of iterations is one a solution.
+        self.iterations = 0;
         let mut outcome = Ok(());
         while self.at == (b, s) && self.stage != Stage::Finished {
             let method = self.method;

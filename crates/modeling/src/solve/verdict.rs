@@ -3,6 +3,7 @@
 use super::refine::{SideState, Solver};
 use crate::constraint::{Demand, curvature};
 use crate::system::{Block, Problem, Structure};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// A row of length 1 may be missed by this share of the size of the shape, whatever the tolerance.
@@ -62,25 +63,38 @@ impl Solver {
             self.notes.push("constraints weigh too little beside the energy to hold the shape".to_owned());
             self.converged = false;
         }
-        if met && self.followers.is_empty() {
+        if met && self.dropped.followers.is_empty() {
             return;
         }
         // By name: rows that were left out because they follow from others are looked at as well.
         let coefficients = self.coefficients();
-        let mut missed: Vec<(usize, f64)> = Vec::new();
-        let noted = |c: usize| self.left_out.binary_search(&c).is_ok();
-        for row in self.problem.rows().iter().filter(|r| r.give == 0.0 && !noted(r.constraint)) {
+        let mut missed: BTreeMap<usize, f64> = BTreeMap::new();
+        let mut miss_of = |constraint: usize, miss: f64| {
+            let most = missed.entry(constraint).or_insert(miss);
+            *most = most.max(miss);
+        };
+        let noted = |c: &usize| self.dropped.missed.binary_search(c).is_ok();
+        for row in self.problem.rows().iter().filter(|r| r.give == 0.0 && !noted(&r.constraint)) {
             let value: f64 = row.entries().map(|(c, i, v)| v * coefficients[c][i]).sum();
             let miss = (value - row.target).abs();
             // What follows from others follows up to their rounding.
-            let follows = self.followers.binary_search(&row.constraint).is_ok();
+            let follows = self.dropped.followers.binary_search(&row.constraint).is_ok();
             if miss.is_nan() || miss > if follows { 1e2 * allowed } else { allowed } {
-                match missed.last_mut().filter(|m| m.0 == row.constraint) {
-                    Some(m) => m.1 = m.1.max(miss * row.length),
-                    None => missed.push((row.constraint, miss * row.length)),
+                miss_of(row.constraint, miss * row.length);
+            }
+        }
+        // Of constraints that are said to be missed some rows may have been kept.
+        for ((structure, block), states) in self.blocks.iter().zip(&self.sides) {
+            for (side, state) in block.sides.iter().zip(states) {
+                for (r, c) in side.constraints.iter().enumerate().filter(|(_, c)| noted(c)) {
+                    let miss = (side.targets[r] - structure.apply_row(r, &state.x)).abs();
+                    if structure.give[r] == 0.0 && (miss.is_nan() || miss > allowed) {
+                        miss_of(*c, miss * structure.lengths[r]);
+                    }
                 }
             }
         }
+        let missed: Vec<(usize, f64)> = missed.into_iter().collect();
         if missed.is_empty() {
             self.converged &= met;
             return;
@@ -146,7 +160,7 @@ impl Solver {
                     ));
                     self.converged = false;
                 }
-                Some(miss) if miss.abs() <= allowed * s.unit(usual) => {}
+                Some(miss) if miss.abs() <= s.allowed(allowed, usual) => {}
                 Some(miss) => missed.push((s.constraint, miss.abs())),
             }
         }

@@ -43,6 +43,8 @@ pub(crate) struct Active {
     pub(crate) numbers: Numbers,
     pub(crate) parts: Vec<Part>,
     coarse: Arc<Cholesky>,
+    /// Trace of the energy of the coarsest B-splines.
+    coarse_trace: f64,
     /// The null space of the energy in the coarsest B-splines.
     null: Vec<Vec<f64>>,
     marks: Marks,
@@ -82,6 +84,10 @@ pub(crate) struct Gains {
 /// the inactive functions would add.
 const CROWDED: f64 = 0.2;
 
+/// Rounding of an energy, as a share of the square of the largest coefficient times the trace: of the coarsest
+/// B-splines, and of the wavelets, whose coefficients come from sums.
+const NOISE: [f64; 2] = [1e-14, 1e-12];
+
 /// Corrections of a side in one solution.
 const CORRECTIONS: usize = 8;
 
@@ -117,6 +123,7 @@ impl Active {
             numbers,
             parts,
             coarse,
+            coarse_trace: coarsest.trace(),
             scratch: Scratch::default(),
             iterations: 0,
             cover: 0,
@@ -279,8 +286,13 @@ impl Active {
                 }
                 side.multipliers.fill(0.0);
                 kept.iter().zip(&multipliers).for_each(|(r, l)| side.multipliers[*r] = *l);
-                let most = side.x.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
-                out.noise += 1e-12 * most * most * cover.trace() * all.k as f64;
+                // Wavelets are of unit energy; the coarsest B-splines have heights for coefficients.
+                for x in side.x.chunks_exact(n) {
+                    let most = |x: &[f64]| x.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+                    let (corner_most, rest) = (most(&x[..corner]), most(&x[corner..]));
+                    out.noise += NOISE[0] * corner_most * corner_most * self.coarse_trace;
+                    out.noise += NOISE[1] * rest * rest * (n - corner) as f64;
+                }
                 let mut hx = vec![0.0; n];
                 for x in side.x.chunks_exact(n) {
                     cover.times(x, &mut hx, &mut self.scratch);

@@ -1,7 +1,7 @@
 //! The least energy of all functions together, where the gains of single ones say too little about it.
 
 use crate::solve::method::{Method, Settings};
-use crate::solve::refine::{SolveError, Solver};
+use crate::solve::refine::Solver;
 use crate::system::{Problem, Space};
 
 /// Sides of a cell that differ by this factor are not square any more.
@@ -18,16 +18,20 @@ pub(super) fn cells_are_square(space: &Space) -> bool {
 /// The least energy, soft rows included, by the solver that `auto` picks, or a sparse factor where that one fails.
 ///
 /// # Errors
-/// [`SolveError`], and [`SolveError::Method`] where it does not converge.
-pub(super) fn energy(problem: &Problem) -> Result<f64, SolveError> {
-    let settings = Settings { tolerance: 1e-9, ..Settings::default() };
-    let mut full = Solver::new(problem.clone(), settings)?.run()?;
+/// A sentence: they failed, or did not converge.
+pub(super) fn energy(problem: &Problem) -> Result<f64, String> {
+    let solved = |method: Method| {
+        let settings = Settings { method, tolerance: 1e-9, ..Settings::default() };
+        Solver::new(problem.clone(), settings).and_then(Solver::run)
+    };
+    let full = match solved(Method::Auto) {
+        Ok(full) if full.converged() => Ok(full),
+        _ => solved(Method::Cholesky),
+    };
+    let why = "cells are far from square, and the full solution to compare with";
+    let full = full.map_err(|e| format!("{why} failed: {e}"))?;
     if !full.converged() {
-        full = Solver::new(problem.clone(), Settings { method: Method::Cholesky, ..settings })?.run()?;
-    }
-    if !full.converged() {
-        let why = "its cells are far from square, and the full solution to compare with did not converge";
-        return Err(SolveError::Method { method: Method::Wavelet, why });
+        return Err(format!("{why} did not converge"));
     }
     let x = full.coefficients();
     let soft = |row: &crate::constraint::Row| {
