@@ -30,6 +30,8 @@ const MOST_CORRECTIONS: u32 = 12;
 const PATTERNS: u64 = 3;
 const MANY: usize = 30_000;
 const ONE_FOR_ALL: f64 = 1.155;
+/// Where emitters are met by rays, the few that meet them tell less than there is of scatter, by about this factor.
+const SELDOM: f64 = 1.15;
 /// The part of the scatter that others pass on is wanted to this share of the scatter.
 const SPREAD_TOLERANCE: f64 = 0.15;
 /// Most Krylov vectors for it.
@@ -304,10 +306,12 @@ impl Sampled {
             square += measure * verdict.per_direction.powi(2);
         }
         let usual = if area > 0.0 { square / area } else { 0.0 };
+        let seldom = if self.lamps.are_all(&self.scene) { 1.0 } else { SELDOM };
         for (k, verdict) in self.verdicts.iter_mut().enumerate() {
             let basis = self.forest.basis_of(self.gathers[k].node);
             let passed = gather::size_of(basis, &passed[self.slots.range(k)]);
-            *verdict = Verdict { scatter: scatter[k].hypot(passed), ..*verdict };
+            let (scatter, misfit) = (seldom * scatter[k].hypot(passed), seldom * seldom * verdict.misfit);
+            *verdict = Verdict { scatter, misfit, ..*verdict };
             verdict.doubt(usual, f64::from(self.gathers[k].drawn));
         }
         positive::keep_positive(&self.forest, &mut irradiance);

@@ -203,6 +203,11 @@ impl Lamps {
         self.is_lamp[side]
     }
 
+    /// Whether no side shines but lamps.
+    pub(super) fn are_all(&self, scene: &Scene) -> bool {
+        (0..scene.sides.len()).all(|i| self.is_lamp[i] || scene.material(scene.sides[i]).radiance.sum() == 0.0)
+    }
+
     /// The lamps that an element may see, and what may stand between.
     pub(super) fn seen_by(&self, kernel: &LightKernel, cell: &Cell) -> Seen {
         let element = kernel.element(cell);
