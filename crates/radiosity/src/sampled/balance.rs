@@ -310,8 +310,9 @@ impl Sampled {
         for (k, verdict) in self.verdicts.iter_mut().enumerate() {
             let basis = self.forest.basis_of(self.gathers[k].node);
             let passed = gather::size_of(basis, &passed[self.slots.range(k)]);
-            let (scatter, misfit) = (seldom * scatter[k].hypot(passed), seldom * seldom * verdict.misfit);
-            *verdict = Verdict { scatter, misfit, ..*verdict };
+            let (scatter, square) = (seldom * scatter[k].hypot(passed), seldom * seldom);
+            let (misfit, certainty) = (square * verdict.misfit, square * verdict.certainty);
+            *verdict = Verdict { scatter, misfit, certainty, ..*verdict };
             verdict.doubt(usual, f64::from(self.gathers[k].drawn));
         }
         positive::keep_positive(&self.forest, &mut irradiance);

@@ -1,7 +1,7 @@
 //! Elements split, and gather at more points.
 
 use super::gather::{Draw, Gather, MOST};
-use super::plan::{DEEPEST, MEAN_OF_MISFIT};
+use super::plan::{DEEPEST, MEAN_OF_MISFIT, SIGNIFICANT};
 use super::slots::Slots;
 use super::verdict::Verdict;
 use super::{LEAST_LAMP_RAYS, SMALL_SHARE, Sampled, TINY_SHARE};
@@ -10,8 +10,6 @@ use ondelette_compress::{NodeId, transport};
 
 /// A misfit below this share of what is allowed is not worth a split.
 const WORTHY: f64 = 1.0 / 400.0;
-/// A misfit larger than this many of its standard deviations is one.
-const SIGNIFICANT: f64 = 1.5;
 /// An element that sends on this many times the share of the light that its grain is meant for is not one of very many.
 const BRIGHT: f64 = 4.0;
 

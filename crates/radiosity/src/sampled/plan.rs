@@ -40,12 +40,15 @@ pub(super) const MEAN_OF_MISFIT: f64 = 0.8;
 /// Mean root of the positive part of a scattered number of mean 0, over the root of its standard deviation.
 pub(super) const FLOOR: f64 = 0.4;
 /// A misfit larger than this many of its standard deviations is one.
-const SIGNIFICANT: f64 = 1.5;
+pub(super) const SIGNIFICANT: f64 = 1.5;
 /// Most rays of a point to the lamps where they scatter, and the factor of them below which more are not worth it.
 pub(super) const MOST_LAMP_RAYS: f64 = 16_384.0;
 const ENOUGH_LAMP_RAYS: f64 = 1.2;
 /// Share of the room in memory that is left which direct light may take.
 const DIRECT_SHARE: f64 = 0.75;
+/// Where nothing brings down a kind of error that alone is too much, this share of the aim is tried before the end: a
+/// little more of some rays is not worth it, more may be.
+const STUCK: f64 = 0.8;
 /// Deepest split.
 pub(super) const DEEPEST: u32 = 16;
 /// Rounds after which every round aims lower by as much as is missing, within these limits.
@@ -174,6 +177,7 @@ impl Sampled {
     /// Plans the next batch: direct light first, then the gathered.
     pub(super) fn spend(&mut self) {
         self.whole = self.integral_of_direct() + self.reflected;
+        let first_aim = self.aim;
         loop {
             let aim = self.aim * self.settings.error * self.whole / (SAFETY * self.overlap);
             let kinds = self.kinds();
@@ -203,7 +207,8 @@ impl Sampled {
             }
             // every part is within its share, and yet the sum is not
             self.aim *= 0.93;
-            if self.aim < 0.05 || self.full || stuck {
+            let hopeless = stuck && self.aim < STUCK * first_aim;
+            if self.aim < 0.05 || self.full || hopeless {
                 self.stalled = true;
                 self.phase = Phase::Finished;
                 return;
