@@ -29,6 +29,19 @@ pub struct Gmres<const C: usize> {
     done: bool,
 }
 
+/// Weighted 2-norm, a channel: that of [`Gmres`].
+///
+/// # Panics
+/// If the lengths differ.
+///
+/// ```
+/// assert_eq!(ondelette_numerics::krylov::norm(&[1.0, 4.0], &[[3.0], [2.0]]), [5.0]);
+/// ```
+pub fn norm<const C: usize>(weights: &[f64], vector: &[[f64; C]]) -> [f64; C] {
+    assert_eq!(weights.len(), vector.len());
+    dot(weights, vector, vector).map(f64::sqrt)
+}
+
 impl<const C: usize> Gmres<C> {
     /// Starts from `start`, with `residual` = b - A start.
     ///
@@ -37,7 +50,7 @@ impl<const C: usize> Gmres<C> {
     pub fn new(start: Vec<[f64; C]>, residual: Vec<[f64; C]>, weights: Vec<f64>) -> Self {
         assert_eq!(start.len(), residual.len());
         assert_eq!(start.len(), weights.len());
-        let norm = dot(&weights, &residual, &residual).map(f64::sqrt);
+        let norm = norm(&weights, &residual);
         let mut solver = Gmres {
             start,
             weights,

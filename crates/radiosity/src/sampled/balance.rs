@@ -14,7 +14,7 @@ use super::plan::UNSOLVED;
 use super::verdict::Verdict;
 use super::{Phase, RAYS_A_STEP, Sampled, Scratch, positive, stitch};
 use crate::solver::Event;
-use ondelette_numerics::krylov::Gmres;
+use ondelette_numerics::krylov::{Gmres, norm};
 use ondelette_numerics::{par, seed};
 
 /// Krylov vectors kept before a restart.
@@ -188,7 +188,7 @@ impl Sampled {
             let lengths = gmres.residual();
             let passed = direction.iter().zip(&product).map(|(x, p)| std::array::from_fn(|c| x[c] - p[c]));
             let passed: Vec<[f64; 3]> = passed.collect();
-            let passed = Gmres::new(passed.clone(), passed, self.weights()).residual();
+            let passed = norm(&self.weights(), &passed);
             let lacking = self.relative(std::array::from_fn(|c| lengths[c] * passed[c]));
             if lacking <= self.wanted() && self.corrections > 0 {
                 let gathered = self.indirect.iter().zip(direction);
@@ -259,7 +259,7 @@ impl Sampled {
 
     pub(super) fn spread(&mut self, mut spread: Spread) -> Event {
         let size = |v: [f64; 3]| v.iter().sum::<f64>();
-        let scatter = size(Gmres::new(spread.apart.clone(), spread.apart.clone(), self.weights()).residual());
+        let scatter = size(norm(&self.weights(), &spread.apart));
         let open = size(spread.gmres.residual()) > SPREAD_TOLERANCE * scatter && spread.gmres.steps() < spread.most;
         if let Some(direction) = spread.gmres.direction().filter(|_| open) {
             let product = self.apply(direction);

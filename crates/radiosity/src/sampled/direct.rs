@@ -12,7 +12,7 @@ use ondelette_numerics::{dense, seed};
 use ondelette_wavelet::cell::{CellBasis, CellShape};
 
 /// Direct light of one element.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Fit {
     /// For unit exitance of each group of lamps, `[group][function]`.
     pub(super) coefficients: Vec<f64>,
@@ -181,13 +181,14 @@ pub(super) struct Known {
 }
 
 impl Known {
-    fn of(cut: &[f64], found: &[[f64; 2]], points: usize) -> Self {
+    /// The groups of which anything was found, and what.
+    fn found(cut: &[f64], found: &[[f64; 2]], points: usize) -> (Box<[u8]>, Box<[[f32; 3]]>) {
         let both = |k: usize| [cut[k] as f32, found[k][0] as f32, found[k][1] as f32];
         let own = |g: usize| (g * points..(g + 1) * points).map(both);
         let groups: Box<[u8]> =
             (0..cut.len() / points).filter(|g| own(*g).any(|v| v != [0.0; 3])).map(|g| g as u8).collect();
         let found = groups.iter().flat_map(|g| own(usize::from(*g))).collect();
-        Known { groups, found, crowded: Box::default(), rays: 0.0, whole: 0.0, batches: 0 }
+        (groups, found)
     }
 
     /// What was cut out and found, of so many groups and points.
@@ -231,15 +232,7 @@ pub(super) fn fit(
         let open = grid.points.iter().filter(|x| !is_buried(**x)).count();
         let (lit, _) = share_of(kernel, cell, open, grid.points.len());
         let coefficients = vec![0.0; groups * n];
-        return Fit {
-            coefficients,
-            misfit: zero.clone(),
-            scatter: zero,
-            lit,
-            work: [points, 0.0],
-            known: None,
-            crowded: false,
-        };
+        return Fit { coefficients, misfit: zero.clone(), scatter: zero, lit, work: [points, 0.0], ..Fit::default() };
     }
     // a fit that goes on knows the lamps at its points only
     let once_more = || known.map(|_| lamps.seen_by(kernel, cell));
@@ -304,7 +297,7 @@ pub(super) fn fit(
             coefficients.extend(own);
         }
         let work = [seen.work() * count as f64, 0.0];
-        return Fit { coefficients, misfit, scatter: zero, lit: 1.0, work, known: None, crowded: false };
+        return Fit { coefficients, misfit, scatter: zero, lit: 1.0, work, ..Fit::default() };
     }
     let grid = Grid::of(basis, cell.key);
     let count = grid.points.len();
@@ -324,12 +317,9 @@ pub(super) fn fit(
     let work = [seen.work(), crowded.iter().map(|c| fresh * f64::from(c.1)).sum()].map(|w: f64| w * count as f64);
     let is_crowded = seen.is_crowded() || !crowded.is_empty();
     let doubt = if is_crowded { lamps.doubt } else { 1.0 };
-    let known = (!crowded.is_empty()).then(|| Known {
-        crowded: crowded.into(),
-        rays,
-        whole,
-        batches: batch + 1,
-        ..Known::of(&cut, &found, count)
+    let known = (!crowded.is_empty()).then(|| {
+        let (groups, found) = Known::found(&cut, &found, count);
+        Known { groups, found, crowded: crowded.into(), rays, whole, batches: batch + 1 }
     });
     // where no lamp shines it may be dark inside of something
     let dark = |q: usize| (0..groups).all(|g| values[g * count + q] == [0.0; 2]) && is_buried(grid.points[q]);
@@ -347,15 +337,7 @@ pub(super) fn fit(
             coefficients.extend(grid.one().map(|one| one * mean));
         }
         coefficients.resize(groups * n, 0.0);
-        return Fit {
-            coefficients,
-            misfit: zero.clone(),
-            scatter: zero,
-            lit: share,
-            work,
-            known: None,
-            crowded: false,
-        };
+        return Fit { coefficients, misfit: zero.clone(), scatter: zero, lit: share, work, ..Fit::default() };
     }
     // what rays may have failed to find, and the groups to which there are too few to tell shape from scatter
     let (overlooked, sent) = lamps.overlooked(crowded, whole, rays * count as f64);
@@ -369,15 +351,8 @@ pub(super) fn fit(
         let rim_values = |g: usize| (0..rim.len()).map(move |q| g * rim.len() + q);
         let beside = |g: usize| rim_values(g).map(|k| 0.5 * (found[k][0] + found[k][1]) + cut[k]).sum::<f64>();
         let misfit = (0..groups).map(|g| (BESIDE * beside(g)) as f32).collect();
-        return Fit {
-            coefficients: vec![0.0; groups * n],
-            misfit,
-            scatter: overlooked,
-            lit: share,
-            work,
-            known,
-            crowded: false,
-        };
+        let coefficients = vec![0.0; groups * n];
+        return Fit { coefficients, misfit, scatter: overlooked, lit: share, work, known, crowded: false };
     }
     let part = if alive == count { None } else { Some(grid.part(&lit, n)) };
     let matrix = part.as_ref().unwrap_or(&grid.matrix);

@@ -12,6 +12,7 @@ use super::points::{self, Grain, Marks, Point, strata};
 use super::rays::{Ray, Rays};
 use super::verdict::Verdict;
 use crate::kernel::LightKernel;
+use crate::rgb::Rgb;
 use ondelette_compress::{Forest, NodeId};
 use ondelette_numerics::sobol::Sobol;
 use ondelette_numerics::{dense, seed};
@@ -395,6 +396,11 @@ pub(super) fn order_of(basis: &CellBasis, points: usize) -> usize {
 /// The lowest order of functions that a basis has by themselves.
 pub(super) fn coarsest(basis: &CellBasis) -> usize {
     if basis.is_nested() { 1 } else { basis.order() }
+}
+
+/// Mean over an element of the function with these coefficients.
+pub(super) fn mean_of(basis: &CellBasis, coefficients: &[[f64; 3]]) -> [f64; 3] {
+    basis.mean(coefficients, [0.0; 3], |a, b, k| (Rgb(a) + Rgb(b) * k).0)
 }
 
 /// Root mean square over an element of the function with these coefficients, channels summed.

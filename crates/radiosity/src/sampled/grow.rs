@@ -1,6 +1,6 @@
 //! Elements split, and gather at more points.
 
-use super::gather::{Draw, Gather, MOST};
+use super::gather::{Draw, Gather, MOST, mean_of};
 use super::plan::{DEEPEST, MEAN_OF_MISFIT, SIGNIFICANT};
 use super::slots::Slots;
 use super::verdict::Verdict;
@@ -93,7 +93,7 @@ impl Sampled {
             if node.first_child == 0 {
                 let basis = self.forest.basis(node.cell.shape);
                 let own = &self.irradiance[n * stride..n * stride + basis.len()];
-                let mean = basis.mean(own, [0.0; 3], |a, b, k| (Rgb(a) + Rgb(b) * k).0);
+                let mean = mean_of(basis, own);
                 let side = self.scene.sides[node.cell.root as usize];
                 light[n] = node.measure * (self.scene.material(side).reflectance * Rgb(mean)).sum();
             }

@@ -488,7 +488,7 @@ impl Sampled {
             if node.first_child == 0 && self.counts(node.cell.root) {
                 let basis = self.forest.basis(node.cell.shape);
                 let own = &values[n * stride..n * stride + basis.len()];
-                let mean = basis.mean(own, [0.0; 3], |a, b, k| (Rgb(a) + Rgb(b) * k).0);
+                let mean = gather::mean_of(basis, own);
                 sum += node.measure * f64::from(self.lit[n]) * mean.iter().sum::<f64>();
             }
         }
@@ -505,8 +505,7 @@ impl Sampled {
                 let mut all = [[0.0; 3]; gather::MOST];
                 let own = gather.functions(&self.forest).iter().zip(&gathered[self.slots.range(k)]);
                 own.for_each(|(&i, v)| all[usize::from(i)] = *v);
-                let mean = basis.mean(&all[..basis.len()], [0.0; 3], |a, b, k| (Rgb(a) + Rgb(b) * k).0);
-                sum += node.measure * mean.iter().sum::<f64>();
+                sum += node.measure * gather::mean_of(basis, &all[..basis.len()]).iter().sum::<f64>();
             }
         }
         sum
