@@ -35,6 +35,15 @@ pub(crate) enum DirectLight {
     Gather,
 }
 
+impl From<DirectLight> for ondelette_radiosity::DirectLight {
+    fn from(named: DirectLight) -> Self {
+        match named {
+            DirectLight::Fitted => Self::Fitted,
+            DirectLight::Gather => Self::Gathered,
+        }
+    }
+}
+
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// Light a scene
@@ -134,8 +143,10 @@ pub(crate) struct LightArgs {
     #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     pub(crate) max_time: Option<String>,
 
-    /// Direct light in pictures and lit models: fitted (as solved), or gathered anew, with exact visibility, at every
-    /// pixel and vertex that is in a penumbra; models get as many vertices there as the shadows need
+    /// How direct light is read from the solution: fitted (elements are as small as shadows need), or gathered from the
+    /// lamps, with exact visibility, at every pixel, vertex and point in a penumbra. The promise is for what is read so:
+    /// gathered, far fewer elements do, and what reads the solution takes longer; models get as many vertices as the
+    /// shadows need
     #[arg(long, value_name = "HOW", default_value = "fitted")]
     pub(crate) direct: DirectLight,
 
@@ -207,9 +218,9 @@ pub(crate) struct RelightArgs {
     #[arg(short = 'o', long = "output", value_name = "PATH", required = true)]
     pub(crate) outputs: Vec<PathBuf>,
 
-    /// Direct light in pictures and lit models, as for `ondelette light`
-    #[arg(long, value_name = "HOW", default_value = "fitted")]
-    pub(crate) direct: DirectLight,
+    /// How direct light is read: fitted or gather, as for `ondelette light` [default: as before]
+    #[arg(long, value_name = "HOW")]
+    pub(crate) direct: Option<DirectLight>,
 
     /// Keep the samples in the .onl file that is written
     #[arg(long)]
@@ -253,10 +264,10 @@ pub(crate) struct ProbeArgs {
     #[arg(short = 'o', long = "output", value_name = "OUT.csv")]
     pub(crate) output: Option<PathBuf>,
 
-    /// Direct light: fitted (as solved), or gathered anew at every point that is in a penumbra, with exact visibility
-    /// (needs a solution of `light --keep-links`)
-    #[arg(long, value_name = "HOW", default_value = "fitted")]
-    pub(crate) direct: DirectLight,
+    /// Direct light: fitted, or gathered at every point in a penumbra, with exact visibility (needs a solution of
+    /// `light --direct gather` or `--keep-links`) [default: as the solution was solved]
+    #[arg(long, value_name = "HOW")]
+    pub(crate) direct: Option<DirectLight>,
 
     /// Irradiance at free points and normals, gathered from the solved scene; the radiosity columns stay empty
     #[arg(long)]

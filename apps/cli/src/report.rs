@@ -3,7 +3,7 @@
 use crate::interrupt::Reason;
 use crate::plan::light::LightPlan;
 use ondelette_radiosity::ledger::Ledger;
-use ondelette_radiosity::{Method, Rgb, Solution};
+use ondelette_radiosity::{DirectLight, Method, Rgb, Solution};
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -120,6 +120,7 @@ impl Record<'_> {
                     .then(|| settings.links.decomposition.to_string()),
                 "subdivision": settings.links.subdivision,
                 "error": settings.error,
+                "direct": if settings.direct == DirectLight::Gathered { "gather" } else { "fitted" },
                 "two_sided": self.plan.two_sided,
                 "max_time_seconds": self.plan.max_time.map(|t| t.as_secs_f64()),
                 "threads": self.plan.threads,

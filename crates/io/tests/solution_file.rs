@@ -1,8 +1,9 @@
 //! Solutions survive the disk, and no file, however made up, does harm.
 
 use ondelette_io::onl::{ChunkFile, ChunkWriter, OnlError, solution_bytes, solution_of};
+use ondelette_radiosity::probe::Prober;
 use ondelette_radiosity::scene::samples;
-use ondelette_radiosity::{Method, Rgb, Scene, Settings, Solution, Solver};
+use ondelette_radiosity::{DirectLight, Method, Rgb, Scene, Settings, Solution, Solver};
 use proptest::prelude::*;
 use std::collections::BTreeSet;
 use std::sync::OnceLock;
@@ -188,11 +189,31 @@ fn kept_samples_survive_the_disk_and_are_gone_on_from() {
         let [a, b] = [&back, &again].map(|s| s.mean_irradiance(side).sum());
         assert!((a - b).abs() <= 0.01 * (a + b) + 1e-9, "side {side}: {a} and {b}");
     }
-    assert!(Solver::resume(&back.without_kept()).is_err());
+    assert!(Solver::resume(&back.without_samples()).is_err());
     // links are always kept
     let mut linked = Solver::resume(&open(sample().to_vec()).unwrap()).unwrap();
     while !matches!(linked.step(), Some(ondelette_radiosity::Event::Solved { .. }) | None) {}
     assert!(linked.solution().mean_irradiance(0).sum() > 0.0);
+}
+
+#[test]
+fn what_direct_light_is_gathered_by_survives_the_disk_without_samples() {
+    let settings = Settings { error: 0.2, direct: DirectLight::Gathered, ..Settings::default() };
+    let solve = |end: fn(Solver) -> Solution| {
+        let mut solver = Solver::new(corner(), settings).unwrap();
+        while solver.step().is_some() {}
+        end(solver)
+    };
+    let [bare, kept] = [solve(Solver::into_solution), solve(Solver::into_kept)];
+    assert_eq!(solution_bytes(&bare), solution_bytes(&kept.clone().without_samples()));
+    let back = open(solution_bytes(&bare)).unwrap();
+    assert_eq!(back.settings().direct, DirectLight::Gathered);
+    let [a, b] = [Prober::new(&kept), Prober::new(&back)];
+    for k in 0..100 {
+        let at = [0.005 + f64::from(k % 10) / 10.0, 0.007 + f64::from(k / 10) / 10.0];
+        assert_eq!(a.irradiance(0, at), b.irradiance(0, at), "{at:?}");
+    }
+    assert!(Solver::resume(&back).is_err() && Solver::resume(&kept).is_ok());
 }
 
 /// The kept sample with one chunk changed, checksums right.

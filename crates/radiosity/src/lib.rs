@@ -17,6 +17,6 @@ pub mod visible;
 pub use rgb::Rgb;
 pub use sampled::Kept;
 pub use scene::Scene;
-pub use settings::{Basis, Decomposition, Iteration, LinkSettings, Method, Oracle, Settings, Weight};
+pub use settings::{Basis, Decomposition, DirectLight, Iteration, LinkSettings, Method, Oracle, Settings, Weight};
 pub use solution::{Solution, Statistics, Terms};
 pub use solver::{Event, MatrixTooLarge, SolveError, Solver};

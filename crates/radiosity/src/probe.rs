@@ -1,8 +1,12 @@
 //! Reading a solution at points: on its surfaces, or gathered at free points.
+//!
+//! Where the settings say [`DirectLight::Gathered`], direct light at a point in a penumbra is that of the lamps with exact
+//! visibility, and shadows are crisp at any density of points.
 
 use crate::kernel::LightKernel;
 use crate::rgb::Rgb;
 use crate::sampled::ExactDirect;
+use crate::settings::DirectLight;
 use crate::solution::Solution;
 use glam::DVec3;
 use ondelette_compress::NodeId;
@@ -25,8 +29,27 @@ const FACING: f64 = 0.5;
 const SMALL: f64 = 0.25;
 
 impl<'a> Prober<'a> {
-    /// Prepares a solution. Cost: building its ray structure.
+    /// Prepares a solution, to be read as its settings say; as it was fitted, if it was stopped before there was
+    /// anything to gather direct light by. Cost: building its ray structure.
     pub fn new(solution: &'a Solution) -> Self {
+        let mut prober = Self::fitted(solution);
+        if solution.settings().direct == DirectLight::Gathered {
+            prober.exact = ExactDirect::new(solution, &prober.kernel);
+        }
+        prober
+    }
+
+    /// Prepares a solution, to be read in a given way. `None` if direct light is to be gathered and the solution did
+    /// not keep what that takes.
+    pub fn reading(solution: &'a Solution, direct: DirectLight) -> Option<Self> {
+        let mut prober = Self::fitted(solution);
+        if direct == DirectLight::Gathered {
+            prober.exact = Some(ExactDirect::new(solution, &prober.kernel)?);
+        }
+        Some(prober)
+    }
+
+    fn fitted(solution: &'a Solution) -> Self {
         let forest = solution.forest();
         let mut means = vec![Rgb::BLACK; forest.len()];
         solution.each_leaf(|leaf, side, _, mean| {
@@ -44,13 +67,6 @@ impl<'a> Prober<'a> {
             }
         }
         Prober { solution, kernel: LightKernel::new(solution.scene()), means, exact: None }
-    }
-
-    /// Gathers direct light anew at every point whose leaf is penumbra, with exact visibility: shadows stay crisp at
-    /// any density of points. `None` if the solution did not keep its samples.
-    pub fn with_exact_direct_light(mut self) -> Option<Self> {
-        self.exact = Some(ExactDirect::new(self.solution, &self.kernel)?);
-        Some(self)
     }
 
     /// The side under a point whose normal faces the same way, and the side-local coordinates there.
@@ -93,16 +109,12 @@ impl<'a> Prober<'a> {
             return Rgb::BLACK;
         }
         match &self.exact {
-            Some(exact) if exact.is_marked(leaf) => {
-                let correction = exact.correction(self.solution, &self.kernel, leaf, x);
-                (self.solution.irradiance_in_leaf(side, at) + correction).map(|e| e.max(0.0))
-            }
+            Some(exact) if exact.is_marked(leaf) => exact.irradiance(self.solution, &self.kernel, leaf, x),
             _ => self.solution.irradiance(side, at),
         }
     }
 
-    /// Whether direct light is gathered anew on a leaf: [`Prober::with_exact_direct_light`] was called, and the leaf's
-    /// functions miss too much of it.
+    /// Whether direct light is gathered on a leaf: it is to be, and the leaf's functions miss too much of it.
     ///
     /// # Panics
     /// If there is no such node.
@@ -118,12 +130,11 @@ impl<'a> Prober<'a> {
     /// If there is no such node.
     pub fn irradiance_on(&self, leaf: NodeId, x: [f64; 2]) -> Rgb {
         let cell = &self.solution.forest().node(leaf).cell;
-        let fitted = self.solution.inside(leaf, x);
-        if !self.is_penumbra(leaf) || self.is_inside(leaf, cell.root as usize, cell.to_root(x)) {
-            return fitted;
+        let lit = |_: &&ExactDirect| !self.is_inside(leaf, cell.root as usize, cell.to_root(x));
+        match self.exact.as_ref().filter(|exact| exact.is_marked(leaf)).filter(lit) {
+            Some(exact) => exact.irradiance(self.solution, &self.kernel, leaf, x),
+            None => self.solution.inside(leaf, x),
         }
-        let correction = self.exact.as_ref().map(|e| e.correction(self.solution, &self.kernel, leaf, x));
-        (fitted + correction.unwrap_or(Rgb::BLACK)).map(|e| e.max(0.0))
     }
 
     /// Whether a point of a side, on this leaf, is inside of something.

@@ -87,6 +87,17 @@ impl FromStr for Basis {
     }
 }
 
+/// How direct light is read from a solution.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum DirectLight {
+    /// From the functions that were fitted to it: reading costs next to nothing, and elements are small along shadows.
+    #[default]
+    Fitted,
+    /// From the lamps themselves, with exact visibility, at every point that is read in a penumbra. Elements need to be
+    /// small only where that matters to reflected light, and the promise is for what is read so.
+    Gathered,
+}
+
 /// Settings of a solution; the same settings and scene give the same bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
@@ -96,13 +107,21 @@ pub struct Settings {
     pub method: Method,
     /// Promised error: area-weighted mean absolute error of the irradiance over its area-weighted mean, as a fraction.
     pub error: f64,
+    /// How direct light is read; gathered only by [`Method::Sampled`].
+    pub direct: DirectLight,
     /// What methods with links are told; the default for others.
     pub links: LinkSettings,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Settings { basis: Basis::M2, method: Method::Sampled, error: 0.01, links: LinkSettings::default() }
+        Settings {
+            basis: Basis::M2,
+            method: Method::Sampled,
+            error: 0.01,
+            direct: DirectLight::Fitted,
+            links: LinkSettings::default(),
+        }
     }
 }
 
@@ -112,6 +131,9 @@ pub enum SettingsError {
     /// The promised error is no number in the range we can keep.
     #[error("an error of {0} % makes no sense: give between 0.01 % and 100 %")]
     Error(f64),
+    /// Direct light to be gathered of a method that does not know its lamps.
+    #[error("direct light can be gathered only with --method sampled (the default), not with {0}: leave it out")]
+    Gathered(Method),
     /// Choices that do not go together.
     #[error(transparent)]
     Links(#[from] LinkSettingsError),
@@ -137,6 +159,9 @@ impl Settings {
     pub fn validated(self) -> Result<Self, SettingsError> {
         if !(1e-4..=1.0).contains(&self.error) {
             return Err(SettingsError::Error(100.0 * self.error));
+        }
+        if self.direct == DirectLight::Gathered && self.method.has_links() {
+            return Err(SettingsError::Gathered(self.method));
         }
         links::validate(&self)?;
         Ok(self)

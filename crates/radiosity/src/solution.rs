@@ -3,7 +3,7 @@
 use crate::rgb::Rgb;
 use crate::sampled::Kept;
 use crate::scene::Scene;
-use crate::settings::Settings;
+use crate::settings::{DirectLight, Settings};
 use crate::solver::MatrixTooLarge;
 use glam::DVec3;
 use ondelette_compress::{Forest, Links, NodeId};
@@ -113,21 +113,24 @@ impl Solution {
         &self.errors
     }
 
-    /// Adds the samples that relighting and refining go on from (see [`Kept::check`]).
+    /// Adds the samples that relighting and refining go on from, or direct light alone (see [`Kept::check`]).
     #[must_use]
     pub fn with_kept(mut self, kept: Arc<Kept>) -> Self {
         self.kept = Some(kept);
         self
     }
 
-    /// The same without kept samples.
+    /// The same without kept samples; of these stays what direct light is read by, if it is to be gathered.
     #[must_use]
-    pub fn without_kept(mut self) -> Self {
-        self.kept = None;
+    pub fn without_samples(mut self) -> Self {
+        self.kept = match self.settings.direct {
+            DirectLight::Gathered => self.kept.map(|kept| Arc::new(kept.without_samples())),
+            DirectLight::Fitted => None,
+        };
         self
     }
 
-    /// The samples that were kept, if any.
+    /// What was kept, if anything: samples to go on from, or direct light alone.
     pub fn kept(&self) -> Option<&Arc<Kept>> {
         self.kept.as_ref()
     }
@@ -196,12 +199,6 @@ impl Solution {
             }
         }
         if count > 0.0 { sum * (1.0 / count) } else { self.inside(leaf, x) }
-    }
-
-    /// Irradiance by the polynomial of the one leaf that holds a point, also on edges.
-    pub(crate) fn irradiance_in_leaf(&self, side: usize, at: [f64; 2]) -> Rgb {
-        let (leaf, x) = self.forest.locate(side, at);
-        self.inside(leaf, x)
     }
 
     /// The polynomial of one leaf.

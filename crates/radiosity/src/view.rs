@@ -6,6 +6,7 @@ use crate::kernel::LightKernel;
 use crate::probe::Prober;
 use crate::rgb::Rgb;
 use crate::scene::{Camera, Scene};
+use crate::settings::DirectLight;
 use crate::solution::Solution;
 use glam::DVec3;
 use ondelette_numerics::par;
@@ -52,20 +53,13 @@ impl Lens {
 }
 
 impl<'a> Renderer<'a> {
-    /// Prepares a picture of `width` x `height` pixels.
+    /// Prepares a picture of `width` x `height` pixels, of the solution as its settings say that it is read.
     pub fn new(solution: &'a Solution, camera: &Camera, width: usize, height: usize) -> Self {
         let kernel = LightKernel::new(solution.scene());
-        let prober = None;
+        let is_gathered = solution.settings().direct == DirectLight::Gathered;
+        let prober = is_gathered.then(|| Prober::new(solution));
         let lens = Lens::new(camera, width as f64 / height.max(1) as f64);
         Renderer { solution, prober, kernel, lens, size: [width, height], pixels: Vec::with_capacity(width * height) }
-    }
-
-    /// Draws shadows by direct light gathered anew at every point that is in a penumbra; without effect on a solution
-    /// that did not keep its samples.
-    #[must_use]
-    pub fn with_exact_direct_light(mut self) -> Self {
-        self.prober = Prober::new(self.solution).with_exact_direct_light();
-        self
     }
 
     /// Renders the next band of rows; true when the picture is complete.

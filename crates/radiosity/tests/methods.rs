@@ -23,7 +23,7 @@ const SOLVERS: [Iteration; 5] =
 
 fn settings(method: Method, basis: &str, error: f64, iteration: Iteration) -> Settings {
     let links = LinkSettings { iteration, ..LinkSettings::default() };
-    Settings { basis: basis.parse().unwrap(), method, error, links }
+    Settings { basis: basis.parse().unwrap(), method, error, links, ..Settings::default() }
 }
 
 fn solve(scene: &Scene, settings: Settings) -> Solution {
@@ -152,6 +152,7 @@ fn all_solvers_converge_to_the_same_light() {
             method,
             error: if method.is_full() { 0.01 } else { 0.3 },
             links: LinkSettings { iteration, ..links },
+            ..Settings::default()
         };
         let run = |iteration| {
             let mut solver = Solver::new(scene.clone(), told(iteration)).unwrap();
@@ -178,7 +179,13 @@ fn a_sweep_of_gauss_seidel_does_more_than_one_of_jacobi_and_krylov_more_than_bot
     let scene = samples::cube(0.9, [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
     let sweeps = |iteration| {
         let links = LinkSettings { iteration, subdivision: Some(2), ..LinkSettings::default() };
-        let told = Settings { basis: "haar".parse().unwrap(), method: Method::Classical, error: 0.01, links };
+        let told = Settings {
+            basis: "haar".parse().unwrap(),
+            method: Method::Classical,
+            error: 0.01,
+            links,
+            ..Settings::default()
+        };
         let mut solver = Solver::new(scene.clone(), told).unwrap();
         while solver.step().is_some() {}
         solver.into_solution().statistics().iterations

@@ -22,12 +22,12 @@ const JUDGES: [(Oracle, Weight, f64); 8] = [
 
 fn judged(basis: &str, error: f64, oracle: Oracle, weight: Weight) -> Settings {
     let links = LinkSettings { oracle, weight: Some(weight), ..LinkSettings::default() };
-    Settings { basis: basis.parse().unwrap(), method: Method::Wavelet, error, links }
+    Settings { basis: basis.parse().unwrap(), method: Method::Wavelet, error, links, ..Settings::default() }
 }
 
 fn auto(error: f64) -> Settings {
     let links = LinkSettings { graded: true, ..LinkSettings::default() };
-    Settings { basis: Basis::HIGHEST_AUTO, method: Method::Wavelet, error, links }
+    Settings { basis: Basis::HIGHEST_AUTO, method: Method::Wavelet, error, links, ..Settings::default() }
 }
 
 fn solve(scene: &Scene, settings: Settings) -> Solution {
@@ -159,14 +159,14 @@ fn the_standard_decomposition_gives_the_same_light_on_fewer_terms() {
     ] {
         let basis: Basis = basis.parse().unwrap();
         let links = LinkSettings { decomposition: Decomposition::Standard, ..LinkSettings::default() };
-        let standard = solve(&lit_cube, Settings { basis, method, error, links });
+        let standard = solve(&lit_cube, Settings { basis, method, error, links, ..Settings::default() });
         let subdivision = (0..8).find(|n| {
             let count = 6 << (2 * n);
             count == standard.forest().leaves()
         });
         // the full matrix of the same elements, solved as it is
         let links = LinkSettings { subdivision, ..LinkSettings::default() };
-        let galerkin = solve(&lit_cube, Settings { basis, method: full, error, links });
+        let galerkin = solve(&lit_cube, Settings { basis, method: full, error, links, ..Settings::default() });
         assert_eq!(galerkin.forest().leaves(), standard.forest().leaves());
         let off = difference(&standard, &galerkin);
         // dropped terms may take a tenth of the promise, and the two iterations end a tenth of it from the truth
@@ -183,7 +183,7 @@ fn the_standard_decomposition_gives_the_same_light_on_fewer_terms() {
 #[test]
 fn the_standard_decomposition_is_the_same_for_any_number_of_threads() {
     let links = LinkSettings { decomposition: Decomposition::Standard, ..LinkSettings::default() };
-    let told = Settings { basis: Basis::M2, method: Method::Wavelet, error: 0.05, links };
+    let told = Settings { basis: Basis::M2, method: Method::Wavelet, error: 0.05, links, ..Settings::default() };
     let run = |threads| {
         ondelette_numerics::par::with_threads(threads, || {
             let solution = solve(&samples::cube(0.5, [1.0, 0.0, 0.0, 0.2, 0.0, 0.0]), told);

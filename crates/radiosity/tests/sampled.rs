@@ -5,7 +5,7 @@ use ondelette_numerics::par;
 use ondelette_radiosity::ledger::Ledger;
 use ondelette_radiosity::probe::Prober;
 use ondelette_radiosity::scene::{Paint, samples};
-use ondelette_radiosity::{Basis, Event, Method, Rgb, Scene, Settings, Solution, SolveError, Solver};
+use ondelette_radiosity::{Basis, DirectLight, Event, Method, Rgb, Scene, Settings, Solution, SolveError, Solver};
 
 fn solve(scene: Scene, basis: &str, error: f64) -> Solution {
     let basis: Basis = basis.parse().unwrap();
@@ -306,8 +306,8 @@ fn direct_light_gathered_anew_makes_shadows_crisp() {
     while solver.step().is_some() {}
     let coarse = solver.into_kept();
     let fine = solve(scene(), "m2", 0.01);
-    assert!(Prober::new(&fine).with_exact_direct_light().is_none(), "nothing was kept");
-    let [fitted, exact] = [Prober::new(&coarse), Prober::new(&coarse).with_exact_direct_light().unwrap()];
+    assert!(Prober::reading(&fine, DirectLight::Gathered).is_none(), "nothing was kept");
+    let [fitted, exact] = [Prober::new(&coarse), Prober::reading(&coarse, DirectLight::Gathered).unwrap()];
     let truth = Prober::new(&fine);
     // root mean square on a line across the shadow of the box on the floor
     let miss = |prober: &Prober| {
@@ -319,6 +319,79 @@ fn direct_light_gathered_anew_makes_shadows_crisp() {
     };
     let [blurred, crisp] = [miss(&fitted), miss(&exact)];
     assert!(crisp < 0.7 * blurred, "{crisp} against {blurred}");
+}
+
+#[test]
+fn where_direct_light_is_gathered_few_elements_keep_the_promise() {
+    let scene = || samples::quads("box", &room_with_box(0.0));
+    let told = |direct| Settings { error: 0.02, direct, ..Settings::default() };
+    let [fitted, gathered] = [DirectLight::Fitted, DirectLight::Gathered].map(|direct| {
+        let mut solver = Solver::new(scene(), told(direct)).unwrap();
+        while solver.step().is_some() {}
+        solver.into_solution()
+    });
+    assert!(gathered.is_finished() && !gathered.kept().unwrap().has_samples());
+    let [many, few] = [&fitted, &gathered].map(|s| s.forest().leaves());
+    assert!(4 * few < 3 * many, "{few} and {many} elements");
+    let fine = solve(scene(), "m2", 0.004);
+    // mean absolute error of what is read, relative to the mean
+    let error = |prober: &Prober| {
+        let truth = Prober::new(&fine);
+        let (mut off, mut whole) = (0.0, 0.0);
+        for side in
+            (0..scene().sides.len()).filter(|&i| !fine.scene().material(fine.scene().sides[i]).is_pure_emitter())
+        {
+            let area = fine.scene().patches[fine.scene().sides[side].patch as usize].area();
+            for k in 0..400 {
+                let at = [(f64::from(k % 20) + 0.4) / 20.0, (f64::from(k / 20) + 0.6) / 20.0];
+                let [a, b] = [prober, &truth].map(|p| p.irradiance(side, at).sum());
+                off += area * (a - b).abs();
+                whole += area * b;
+            }
+        }
+        off / whole
+    };
+    // the same elements read as they were fitted do not keep it
+    let blurred = error(&Prober::reading(&gathered, DirectLight::Fitted).unwrap());
+    let crisp = error(&Prober::new(&gathered));
+    assert!(crisp < 0.02 && crisp < 0.7 * blurred, "{crisp}, read as fitted {blurred}");
+    // what is read does not depend on what was read before
+    let points: Vec<[f64; 2]> =
+        (0..64).map(|k| [f64::from(k % 8) / 8.0 + 0.03, f64::from(k / 8) / 8.0 + 0.05]).collect();
+    let [forth, back] = [Prober::new(&gathered), Prober::new(&gathered)];
+    let mut there: Vec<Rgb> = points.iter().map(|at| forth.irradiance(0, *at)).collect();
+    there.reverse();
+    let here: Vec<Rgb> = points.iter().rev().map(|at| back.irradiance(0, *at)).collect();
+    assert_eq!(there, here);
+}
+
+#[test]
+fn relighting_may_change_how_direct_light_is_read() {
+    let mut solver =
+        Solver::new(samples::quads("box", &room_with_box(0.0)), Settings { error: 0.03, ..Settings::default() })
+            .unwrap();
+    while solver.step().is_some() {}
+    let kept = solver.into_kept();
+    let stated = |direct, from: &Solution| {
+        let mut solver = Solver::resume(from).unwrap();
+        solver.read_direct(direct).unwrap();
+        loop {
+            match solver.step().unwrap() {
+                Event::Solved { error, .. } => return (error, solver.into_kept()),
+                _ => continue,
+            }
+        }
+    };
+    let (gathered, other) = stated(DirectLight::Gathered, &kept);
+    let (fitted, _) = stated(DirectLight::Fitted, &other);
+    let before = kept.statistics().estimated_error;
+    assert!(gathered < 0.95 * before, "{gathered} from {before}");
+    assert!((fitted - before).abs() < 0.1 * before, "{fitted} from {before}");
+    assert_eq!(other.statistics().rays, kept.statistics().rays);
+    // methods with links know no lamps
+    let linked = Settings { method: Method::Wavelet, error: 0.2, ..Settings::default() };
+    let mut solver = Solver::new(samples::facing_squares(1.0), linked).unwrap();
+    assert!(solver.read_direct(DirectLight::Gathered).is_err() && solver.read_direct(DirectLight::Fitted).is_ok());
 }
 
 #[test]
@@ -336,7 +409,7 @@ fn full_shadow_stays_dark_where_light_is_gathered_anew() {
         Solver::new(samples::quads("hard", &faces), Settings { error: 0.01, ..Settings::default() }).unwrap();
     while solver.step().is_some() {}
     let solution = solver.into_kept();
-    let prober = Prober::new(&solution).with_exact_direct_light().unwrap();
+    let prober = Prober::reading(&solution, DirectLight::Gathered).unwrap();
     // nothing reflects: a sum over the lamp's points is all there is
     let truth = |p: [f64; 2]| {
         let n = 64;

@@ -2,13 +2,13 @@
 
 use super::check_distinct;
 use super::values::{self, CameraRequest};
-use crate::args::{DirectLight, LightArgs, RelightArgs};
+use crate::args::{LightArgs, RelightArgs};
 use crate::run::Refusal;
 use ondelette_io::Panel;
 use ondelette_io::write::{check_writable, elements_path};
 use ondelette_radiosity::scene::Paint;
 use ondelette_radiosity::settings::{LinkSettingsError, SettingsError};
-use ondelette_radiosity::{Basis, Decomposition, Iteration, LinkSettings, Method, Oracle, Settings};
+use ondelette_radiosity::{Basis, Decomposition, DirectLight, Iteration, LinkSettings, Method, Oracle, Settings};
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -102,8 +102,6 @@ pub(crate) struct LightPlan {
     pub(crate) settings: Settings,
     /// Whether the samples go into the solution file.
     pub(crate) keep: bool,
-    /// Whether pictures and models gather direct light anew.
-    pub(crate) exact: bool,
     /// Whether no ray is cast, whatever the error: relighting without refinement.
     pub(crate) stays: bool,
     /// Bytes that elements and samples may take.
@@ -119,11 +117,6 @@ pub(crate) struct LightPlan {
 /// The flag's value, judged by its type.
 fn parsed<T: FromStr<Err: Display>>(flag: &str, value: &str) -> Result<T, Refusal> {
     value.parse().map_err(|e| Refusal::new(format!("{flag}: {e}")))
-}
-
-/// Why direct light cannot be gathered anew.
-pub(crate) fn needs_samples(method: Method) -> String {
-    format!("it needs the lamps that --method sampled (the default) keeps; with --method {method}, leave it out")
 }
 
 /// What the solver is told.
@@ -166,10 +159,11 @@ fn settings(args: &LightArgs) -> Result<Settings, Refusal> {
             .map_or(Ok(Decomposition::default()), |name| parsed("--decomposition", name))?,
         subdivision: args.subdivision.as_deref().map(subdivision).transpose()?,
     };
-    let settings = Settings { basis, method, error: values::percent(&args.error)?, links };
+    let settings = Settings { basis, method, error: values::percent(&args.error)?, direct: args.direct.into(), links };
     settings.validated().map_err(|e| {
         let flag = match &e {
             SettingsError::Error(_) => "--error",
+            SettingsError::Gathered(_) => "--direct",
             SettingsError::Links(LinkSettingsError::NotGraded(_) | LinkSettingsError::Basis { .. }) => "--basis",
             SettingsError::Links(LinkSettingsError::NoVariation) => "--weight",
             SettingsError::Links(LinkSettingsError::Standard(..)) => "--decomposition",
@@ -205,7 +199,6 @@ impl LightPlan {
             panels: args.lights.iter().map(|text| values::panel(text)).collect::<Result<_, _>>()?,
             settings,
             keep: args.keep_links,
-            exact: args.direct == DirectLight::Gather,
             stays: false,
             memory: args.memory.as_deref().map(values::memory).transpose()?,
             max_time: args.max_time.as_deref().map(values::duration).transpose()?,
@@ -214,10 +207,6 @@ impl LightPlan {
             named,
             report: args.report.clone(),
         };
-        let method = plan.settings.method;
-        if plan.exact && method.has_links() {
-            return Err(Refusal::new(format!("--direct gather: {}", needs_samples(method))));
-        }
         plan.check_outputs()?;
         Ok(plan)
     }
@@ -269,6 +258,8 @@ pub(crate) struct RelightPlan {
     pub(crate) refine: bool,
     /// Another promise.
     pub(crate) error: Option<f64>,
+    /// Another way to read direct light.
+    pub(crate) direct: Option<DirectLight>,
 }
 
 impl RelightPlan {
@@ -285,9 +276,9 @@ impl RelightPlan {
         });
         let paints = emission.chain(reflectance).collect::<Result<Vec<_>, _>>()?;
         let error = args.error.as_deref().map(values::percent).transpose()?;
-        if paints.is_empty() && error.is_none() && !args.refine {
+        if paints.is_empty() && error.is_none() && args.direct.is_none() && !args.refine {
             return Err(Refusal::new(
-                "nothing to change: give --emission MATERIAL=r,g,b, --reflectance MATERIAL=r,g,b, \
+                "nothing to change: give --emission MATERIAL=r,g,b, --reflectance MATERIAL=r,g,b, --direct gather, \
                  or --refine --error 0.5%",
             ));
         }
@@ -297,7 +288,6 @@ impl RelightPlan {
             panels: Vec::new(),
             settings: Settings::default(),
             keep: args.keep_links,
-            exact: args.direct == DirectLight::Gather,
             stays: !args.refine,
             memory: None,
             max_time: args.max_time.as_deref().map(values::duration).transpose()?,
@@ -307,6 +297,6 @@ impl RelightPlan {
             report: args.report.clone(),
         };
         plan.check_outputs()?;
-        Ok(RelightPlan { light: plan, paints, refine: args.refine, error })
+        Ok(RelightPlan { light: plan, paints, refine: args.refine, error, direct: args.direct.map(Into::into) })
     }
 }

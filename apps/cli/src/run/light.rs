@@ -16,7 +16,7 @@ use ondelette_numerics::par;
 use ondelette_radiosity::ledger::Ledger;
 use ondelette_radiosity::scene::{Camera, Shape};
 use ondelette_radiosity::view::{Renderer, frame_from_inside};
-use ondelette_radiosity::{Event, Scene, Solver};
+use ondelette_radiosity::{DirectLight, Event, Scene, Solver};
 use ondelette_wavelet::cell::CellFamily;
 
 /// Pixels of a picture.
@@ -90,12 +90,13 @@ pub(super) fn finish(
     mut progress: Progress,
 ) -> Result<Outcome, Refusal> {
     let memory = Memory { counted: counted.max(solver.counted_bytes()), scene: solver.scene_bytes() };
-    let solution = if plan.keep || plan.exact { solver.into_kept() } else { solver.into_solution() };
+    let solution = if plan.keep { solver.into_kept() } else { solver.into_solution() };
     let is_sampled = !solution.settings().method.has_links();
-    if (plan.keep || plan.exact) && is_sampled && solution.kept().is_none() {
-        tell("note: stopped in the middle of a refinement: the samples are not kept");
+    let is_gathered = solution.settings().direct == DirectLight::Gathered;
+    if (plan.keep || is_gathered) && is_sampled && solution.kept().is_none() {
+        let what = if is_gathered { "direct light is read as fitted" } else { "the samples are not kept" };
+        tell(format_args!("note: stopped in the middle of a refinement: {what}"));
     }
-
     if plan.keep && !is_sampled && solution.links().is_empty() {
         tell("note: --memory has no room for all links: they are not kept");
     }
@@ -126,8 +127,7 @@ fn write_outputs(
     for output in quick {
         progress.stage(&format!("writing {}", output.path.display()), 0.0);
         match output.kind {
-            Kind::Solution if record.plan.keep || solution.kept().is_none() => write_solution(&output.path, solution)?,
-            Kind::Solution => write_solution(&output.path, &solution.clone().without_kept())?,
+            Kind::Solution => write_solution(&output.path, solution)?,
             Kind::Tables => {
                 write_tables(&output.path, solution)?;
                 record.written.push(elements_path(&output.path));
@@ -180,9 +180,6 @@ fn write_outputs(
 fn paint(record: &Record<'_>, camera: Option<Camera>, stop: Stop, progress: &mut Progress) -> Option<LitModel> {
     let solution = record.solution;
     let mut painter = ModelPainter::new(solution, scene_tone(solution), camera_of_model(record, camera));
-    if record.plan.exact {
-        painter = painter.with_exact_direct_light();
-    }
     loop {
         if stop.signalled() && record.stopped != Some(Reason::Signal) {
             return None;
@@ -197,9 +194,6 @@ fn paint(record: &Record<'_>, camera: Option<Camera>, stop: Stop, progress: &mut
 /// The picture, or nothing if a Ctrl-C came that had not come before.
 fn draw(record: &Record<'_>, camera: &Camera, stop: Stop, progress: &mut Progress) -> Option<Vec<[f32; 3]>> {
     let mut renderer = Renderer::new(record.solution, camera, PICTURE[0], PICTURE[1]);
-    if record.plan.exact {
-        renderer = renderer.with_exact_direct_light();
-    }
     loop {
         if stop.signalled() && record.stopped != Some(Reason::Signal) {
             return None;

@@ -1,7 +1,7 @@
 //! `ondelette probe`: points in, values out.
 
 use super::{Outcome, Refusal, print, tell};
-use crate::args::{DirectLight, ProbeArgs};
+use crate::args::ProbeArgs;
 use crate::plan::check_distinct;
 use glam::DVec3;
 use ondelette_io::onl::read_solution;
@@ -77,15 +77,15 @@ pub(crate) fn run(args: &ProbeArgs) -> Result<Outcome, Refusal> {
 }
 
 fn answer(solution: &Solution, points: &[Point], args: &ProbeArgs) -> Result<Vec<Option<Answer>>, Refusal> {
-    let mut prober = Prober::new(solution);
-    if args.direct == DirectLight::Gather {
-        prober = prober.with_exact_direct_light().ok_or_else(|| {
+    let prober = match args.direct {
+        None => Prober::new(solution),
+        Some(direct) => Prober::reading(solution, direct.into()).ok_or_else(|| {
             Refusal::new(format!(
-                "{}: it did not keep what --direct gather needs: solve it again with --keep-links",
+                "{}: it did not keep what --direct gather needs: solve it again with --direct gather",
                 args.solution.display()
             ))
-        })?;
-    }
+        })?,
+    };
     let chunks = par::map(points.len().div_ceil(CHUNK), |chunk| {
         let own = &points[chunk * CHUNK..points.len().min((chunk + 1) * CHUNK)];
         let one = |p: &Point| -> Option<Answer> {

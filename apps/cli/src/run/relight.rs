@@ -3,7 +3,7 @@
 use super::light::{camera, finish, is_drawn, most_counted};
 use super::{Outcome, Refusal};
 use crate::interrupt::Stop;
-use crate::plan::light::{RelightPlan, needs_samples};
+use crate::plan::light::RelightPlan;
 use crate::progress::Progress;
 use crate::report::Stages;
 use ondelette_io::onl::read_solution;
@@ -26,6 +26,9 @@ fn relight(plan: RelightPlan, stop: Stop) -> Result<Outcome, Refusal> {
     let mut solver = Solver::resume(&solution)?;
     let settings = solution.settings();
     drop(solution);
+    if let Some(direct) = plan.direct {
+        solver.read_direct(direct)?;
+    }
     if let Some(error) = plan.error {
         solver.promise(error)?;
     }
@@ -38,9 +41,6 @@ fn relight(plan: RelightPlan, stop: Stop) -> Result<Outcome, Refusal> {
     let camera = outputs.files.iter().any(|o| is_drawn(o.kind)).then(|| camera(solver.scene(), light.camera));
     let camera = camera.transpose()?;
     let mut progress = Progress::new(settings.error);
-    if light.exact && settings.method.has_links() {
-        return Err(Refusal::new(format!("--direct gather: {}", needs_samples(settings.method))));
-    }
     let (mut stopped, mut counted) = (None, 0);
     loop {
         stopped = stopped.or(stop.asked());

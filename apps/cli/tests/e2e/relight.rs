@@ -65,6 +65,34 @@ fn what_cannot_be_lit_anew_is_refused() {
 }
 
 #[test]
+fn gathered_direct_light_is_read_wherever_the_solution_is() {
+    let place = Place::new();
+    room(&place);
+    place.run("light room.obj --error 5% --direct gather -o g.onl -o g.png -o g.glb --report g.json").with_code(0);
+    let gathered = report(&place, "g.json");
+    assert_eq!(gathered["settings"]["direct"], "gather");
+    place.run("verify g.onl --points 500").with_code(0);
+    let points: String = (0..40).map(|k| format!("{},0.71,0,0,0,1\n", 0.02 + 0.048 * f64::from(k))).collect();
+    place.write("p.csv", points);
+    let read = |how: &str| place.run(&format!("probe g.onl p.csv {how}")).with_code(0).out;
+    assert_eq!(read(""), read("--direct gather"));
+    assert_ne!(read(""), read("--direct fitted"));
+    // no samples to go on from, unless they are kept
+    place.run("relight g.onl --emission lamp=1 -o x.onl").with_code(2);
+    place.run("light room.obj --error 5% --direct gather --keep-links -o k.onl").with_code(0);
+    place.run("relight k.onl --emission lamp=6,4,2 -o x.onl --report x.json").with_code(0);
+    assert_eq!(report(&place, "x.json")["settings"]["direct"], "gather");
+    place.run("relight k.onl --direct fitted --refine -o x.onl --report x.json").with_code(0);
+    let fitted = report(&place, "x.json");
+    assert_eq!(fitted["settings"]["direct"], "fitted");
+    assert!(fitted["elements"].as_u64() >= gathered["elements"].as_u64());
+    // a solution that kept nothing
+    place.run("light room.obj --error 5% -o bare.onl").with_code(0);
+    let refused = place.run("probe bare.onl p.csv --direct gather").with_code(2);
+    assert!(refused.err.contains("--direct gather"), "{}", refused.err);
+}
+
+#[test]
 fn a_dark_scene_gets_a_lamp() {
     let place = Place::new();
     room(&place);

@@ -28,7 +28,7 @@ pub use solution::{read_solution, solution_bytes, solution_of, write_solution};
 pub use write::ChunkWriter;
 
 /// Version of the format that this program writes and reads.
-pub const VERSION: u32 = 4;
+pub const VERSION: u32 = 5;
 
 const MAGIC: &[u8; 16] = b"ONDELETTE\r\n\x1a\n\0\0\0";
 const HEADER: usize = 64;
@@ -120,7 +120,7 @@ mod tests {
         let mut future = good.clone();
         future[16] += 1;
         let said = message(future);
-        assert!(said.contains("version 5") && said.contains("reads version 4"), "{said}");
+        assert!(said.contains("version 6") && said.contains("reads version 5"), "{said}");
 
         let said = message(good[..good.len() - 1].to_vec());
         assert!(said.contains("cut short") && said.contains(&good.len().to_string()), "{said}");

@@ -8,7 +8,7 @@ use ondelette_compress::forest::Node;
 use ondelette_numerics::par;
 use ondelette_radiosity::probe::Prober;
 use ondelette_radiosity::scene::Camera;
-use ondelette_radiosity::{Rgb, Solution};
+use ondelette_radiosity::{DirectLight, Rgb, Solution};
 use ondelette_wavelet::cell::{CellBasis, CellShape};
 use std::f64::consts::{FRAC_1_PI, PI};
 
@@ -20,7 +20,7 @@ const NODES: usize = 1024;
 /// ... with direct light gathered anew.
 const CRISP_NODES: usize = 128;
 
-/// The model that shows a solution: [`ModelPainter`] at once, with direct light as it was fitted.
+/// The model that shows a solution: [`ModelPainter`] at once.
 ///
 /// ```
 /// use ondelette_io::write::{glb_bytes, lit_model, scene_tone};
@@ -40,7 +40,9 @@ pub fn lit_model(solution: &Solution, tone: ToneMap, camera: Option<Camera>) -> 
 
 /// Makes the model that shows a solution, some elements a step: one mesh an object, one flat colour a box where the
 /// basis is piecewise constant, else colours at the corners of 2 x 2 (order 2) or 4 x 4 quads (higher orders) an
-/// element; with [`ModelPainter::with_exact_direct_light`], of quads as small as shadows need.
+/// element. Where direct light is gathered ([`DirectLight::Gathered`]), it is so at every corner in a penumbra, and
+/// elements are cut there until the shadow is shown to what an eye can tell apart, or to a 2,000th of the scene's
+/// diagonal.
 ///
 /// Colours are the radiance B / pi that leaves, seen through `tone`; positions are in metres. Each side has triangles
 /// of its own, which viewers draw from its front only: the two sides of a patch do not fight for pixels, and one looks
@@ -59,16 +61,9 @@ impl<'a> ModelPainter<'a> {
     pub fn new(solution: &'a Solution, tone: ToneMap, camera: Option<Camera>) -> Self {
         let mesh = |name: &String| LitMesh { name: name.clone(), ..LitMesh::default() };
         let meshes = solution.scene().objects.iter().map(|o| mesh(&o.name)).collect();
-        ModelPainter { solution, tone, camera, exact: None, meshes, done: 0 }
-    }
-
-    /// Gathers direct light anew at every corner in a penumbra, and cuts elements there until the shadow is shown to
-    /// what an eye can tell apart, or to a 2,000th of the scene's diagonal; without effect on a solution that did not
-    /// keep its samples.
-    #[must_use]
-    pub fn with_exact_direct_light(mut self) -> Self {
-        self.exact = Prober::new(self.solution).with_exact_direct_light();
-        self
+        let is_gathered = solution.settings().direct == DirectLight::Gathered;
+        let exact = is_gathered.then(|| Prober::new(solution));
+        ModelPainter { solution, tone, camera, exact, meshes, done: 0 }
     }
 
     /// Paints some more elements; true when all are painted.
@@ -309,16 +304,10 @@ mod tests {
         samples::quads("shadow", &room.chain(block).chain([lamp]).collect::<Vec<_>>())
     }
 
-    fn kept(error: f64) -> Solution {
-        let mut solver = Solver::new(shadow(), Settings { error, ..Settings::default() }).unwrap();
+    fn kept(error: f64, direct: DirectLight) -> Solution {
+        let mut solver = Solver::new(shadow(), Settings { error, direct, ..Settings::default() }).unwrap();
         while solver.step().is_some() {}
         solver.into_kept()
-    }
-
-    fn painted(solution: &Solution, tone: ToneMap) -> LitModel {
-        let mut painter = ModelPainter::new(solution, tone, None).with_exact_direct_light();
-        while !painter.step() {}
-        painter.into_model()
     }
 
     /// The colour that a viewer shows at a point of the plane z = 0, and how many triangles claim it.
@@ -338,10 +327,11 @@ mod tests {
 
     #[test]
     fn shadows_gathered_anew_are_sharp_between_vertices() {
-        let [coarse, fine] = [kept(0.1), kept(0.01)];
+        let [fitted, coarse] = [DirectLight::Fitted, DirectLight::Gathered].map(|direct| kept(0.1, direct));
+        let fine = kept(0.01, DirectLight::Gathered);
         let tone = scene_tone(&fine);
-        let exact = [&coarse, &fine].map(|solution| Prober::new(solution).with_exact_direct_light().unwrap());
-        let models = [lit_model(&coarse, tone, None), painted(&coarse, tone)];
+        let exact = [&coarse, &fine].map(Prober::new);
+        let models = [&fitted, &coarse].map(|solution| lit_model(solution, tone, None));
         let area = |mesh: &LitMesh| {
             let twice = |t: &[u32]| {
                 let [a, b, c] = [0, 1, 2].map(|k| Vec3::from(mesh.positions[t[k] as usize]));
@@ -366,7 +356,7 @@ mod tests {
         // as good as looking at every point; what is left to the truth is reflected light
         assert!(own[1] < 0.5 * own[0], "{own:?}");
         assert!(true_light[1] < 0.8 * true_light[0], "{true_light:?}");
-        let one = par::with_threads(1, || painted(&coarse, tone)).unwrap();
+        let one = par::with_threads(1, || lit_model(&coarse, tone, None)).unwrap();
         for (a, b) in one.meshes.iter().zip(&models[1].meshes) {
             assert!(a.colors == b.colors && a.positions == b.positions && a.indices == b.indices);
         }

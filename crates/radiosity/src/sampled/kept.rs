@@ -11,6 +11,7 @@ use super::rays::{Ray, Rays};
 use super::{Phase, Sampled, counted_area, plan};
 use crate::kernel::LightKernel;
 use crate::scene::{Paint, PaintError, Scene};
+use crate::settings::DirectLight;
 use crate::solution::Solution;
 use ondelette_compress::{Forest, NodeId};
 use ondelette_wavelet::cell::CellShape;
@@ -52,6 +53,26 @@ pub struct Kept {
 }
 
 impl Kept {
+    /// Whether there are samples to go on from, and not direct light alone.
+    pub fn has_samples(&self) -> bool {
+        !self.gathers.is_empty()
+    }
+
+    /// Direct light alone: what reading it exactly needs, for [`DirectLight::Gathered`](crate::DirectLight).
+    #[must_use]
+    pub fn without_samples(&self) -> Self {
+        Kept {
+            groups: self.groups.clone(),
+            lamps: self.lamps.clone(),
+            direct: self.direct.clone(),
+            misfit: self.misfit.clone(),
+            scatter: self.scatter.clone(),
+            lamp_rays: self.lamp_rays.clone(),
+            crowded: self.crowded.clone(),
+            ..Kept::default()
+        }
+    }
+
     /// Whether all of this fits a scene and its forest.
     ///
     /// # Errors
@@ -143,6 +164,9 @@ impl Kept {
         if !self.leaves.iter().all(|&l| is_end(l)) {
             return Err("a sample that ends at no leaf".into());
         }
+        if !self.has_samples() {
+            return Ok(());
+        }
         // every leaf is below one gathering element and no more
         for (n, node) in forest.nodes().iter().enumerate().filter(|(_, node)| node.first_child == 0) {
             let (mut above, mut id) = (0, n);
@@ -163,12 +187,9 @@ impl Kept {
 }
 
 impl Sampled {
-    /// The end, with the samples: none if it was stopped where elements are not fitted yet.
-    pub(crate) fn into_kept(mut self) -> Solution {
-        if self.is_growing() {
-            return self.into_solution();
-        }
-        let mut kept = Kept {
+    /// Direct light alone: none if it was stopped where elements are not fitted yet. Its arrays are moved out.
+    pub(super) fn keep_direct(&mut self) -> Option<Kept> {
+        (!self.is_growing()).then(|| Kept {
             groups: self.lamps.groups.iter().map(|g| g.0).collect(),
             lamps: self.lamps.sides().collect(),
             direct: std::mem::take(&mut self.direct).into_iter().map(f64::from).collect(),
@@ -177,16 +198,21 @@ impl Sampled {
             lamp_rays: std::mem::take(&mut self.rays),
             crowded: std::mem::take(&mut self.crowded).into_iter().map(u8::from).collect(),
             ..Kept::default()
-        };
+        })
+    }
+
+    /// The end, with the samples: none if it was stopped where elements are not fitted yet.
+    pub(crate) fn into_kept(mut self) -> Solution {
+        let Some(mut kept) = self.keep_direct() else { return self.without_samples() };
         for gather in std::mem::take(&mut self.gathers) {
             gather.store(&mut kept);
         }
-        self.into_solution().with_kept(Arc::new(kept))
+        self.without_samples().with_kept(Arc::new(kept))
     }
 
     /// Goes on from a solution that kept its samples; `None` if it has none.
     pub(crate) fn resume(solution: &Solution) -> Option<Self> {
-        let kept = solution.kept()?;
+        let kept = solution.kept().filter(|kept| kept.has_samples())?;
         let (scene, forest) = (solution.scene().clone(), solution.forest().clone());
         let kernel = LightKernel::new(&scene);
         let lamps = Lamps::restore(&scene, &kernel, solution.settings().error, kept);
@@ -234,6 +260,12 @@ impl Sampled {
             let crowded = errors.chunks_mut(groups).zip(&self.crowded).filter(|(_, crowded)| **crowded);
             crowded.for_each(|(errors, _)| errors.iter_mut().for_each(|e| *e *= more));
         }
+        self.begin_again();
+    }
+
+    /// Lets direct light be read in another way.
+    pub(crate) fn read_direct(&mut self, direct: DirectLight) {
+        self.settings.direct = direct;
         self.begin_again();
     }
 

@@ -35,6 +35,8 @@ const SLIVER: f64 = 2e-6;
 /// error, and its limits.
 const WORTHY: f64 = 0.8;
 const WORTHY_LIMITS: [f64; 2] = [0.04, 0.15];
+/// The same share for a point that is read.
+const WORTHY_AT_A_POINT: f64 = 0.005;
 /// So many looks at lamps that may bring most are taken in any case: what is bright may be hidden. Looks that find
 /// nothing in the way are free.
 const LOOKED_AT: usize = 4;
@@ -123,6 +125,12 @@ impl Seen {
         !self.crowded.is_empty() || self.exact.iter().any(|s| s.patches.len() > CROWD)
     }
 
+    /// Counted bytes.
+    pub(super) fn bytes(&self) -> usize {
+        let patches: usize = self.exact.iter().map(|s| size_of_val(&s.patches[..])).sum();
+        size_of_val(&self.exact[..]) + size_of_val(&self.crowded[..]) + patches
+    }
+
     /// Work at a point to cut lamps out exactly, in rays about.
     pub(super) fn work(&self) -> f64 {
         let one = |s: &Sight| if s.patches.is_empty() { 0.5 } else { 2.0 + 0.5 * s.patches.len() as f64 };
@@ -167,6 +175,11 @@ impl Lamps {
         let mut lamps = Lamps { lamps, groups, is_lamp, worthy: 0.0, doubt: 1.0 };
         lamps.promise(error);
         lamps
+    }
+
+    /// The same to be seen from single points, where nothing but rays makes up for a lamp that is not cut out.
+    pub(super) fn for_points(self) -> Self {
+        Lamps { worthy: WORTHY_AT_A_POINT, ..self }
     }
 
     /// Takes over a promise; the factor by which doubt grows.

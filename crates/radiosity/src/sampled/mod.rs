@@ -18,11 +18,13 @@ mod grow;
 mod kept;
 mod lamps;
 mod memory;
+mod penumbra;
 mod plan;
 mod points;
 mod positive;
 mod rays;
 mod shares;
+mod sights;
 mod slots;
 mod sphere;
 mod stitch;
@@ -34,7 +36,7 @@ pub use kept::Kept;
 use crate::kernel::LightKernel;
 use crate::rgb::Rgb;
 use crate::scene::Scene;
-use crate::settings::Settings;
+use crate::settings::{DirectLight, Settings};
 use crate::solution::{Solution, Statistics};
 use crate::solver::{Event, SolveError};
 use balance::{Left, Spread, Sweep};
@@ -44,6 +46,7 @@ use gather::{Draw, Gather};
 use lamps::Lamps;
 use ondelette_compress::{Forest, Links, NodeId, transport};
 use ondelette_numerics::par;
+use penumbra::Missed;
 use points::Grain;
 use slots::Slots;
 use std::sync::Arc;
@@ -291,7 +294,20 @@ impl Sampled {
             .with_errors(self.missed.clone())
     }
 
-    pub(crate) fn into_solution(self) -> Solution {
+    /// The end; with what direct light is read by, if that is to be gathered.
+    pub(crate) fn into_solution(mut self) -> Solution {
+        let kept = match self.settings.direct {
+            DirectLight::Gathered => self.keep_direct(),
+            DirectLight::Fitted => None,
+        };
+        let solution = self.without_samples();
+        match kept {
+            Some(kept) => solution.with_kept(Arc::new(kept)),
+            None => solution,
+        }
+    }
+
+    fn without_samples(self) -> Solution {
         let statistics = self.counts_now();
         Solution::new(self.scene, self.settings, self.forest, Links::new(), self.irradiance, statistics)
             .with_lit(self.lit)
@@ -399,17 +415,20 @@ impl Sampled {
 
     // ---- balance
 
-    /// What of the direct light of a leaf the functions cannot say, and its scatter: mean absolute values, channels
-    /// summed.
-    fn direct_error(&self, node: usize) -> (f64, f64) {
-        let groups = &self.lamps.groups;
-        let (mut misfit, mut square) = (0.0, 0.0);
-        for (g, (_, exitance)) in groups.iter().enumerate() {
-            let k = node * groups.len() + g;
-            misfit += exitance.sum() * f64::from(self.misfit[k]);
-            square += (exitance.sum() * f64::from(self.scatter[k])).powi(2);
-        }
-        (misfit, plan::MEAN_OF_SCATTER * square.sqrt())
+    /// What counts of the direct light of a leaf that the functions cannot say, of its scatter, and of that of what is
+    /// read there: mean absolute values, channels summed.
+    fn direct_error(&self, node: usize) -> [f64; 3] {
+        let groups = self.lamps.groups.len();
+        let own = node * groups..(node + 1) * groups;
+        let missed = Missed::of(&self.lamps.groups, &self.misfit[own.clone()], &self.scatter[own]);
+        let (counted, read) = match self.settings.direct {
+            DirectLight::Fitted => (missed, 0.0),
+            DirectLight::Gathered => {
+                let allowed = penumbra::allowed(self.settings.error, self.whole / self.counted_area);
+                missed.gathered(allowed, f64::from(self.rays[node]))
+            }
+        };
+        [counted.misfit, plan::MEAN_OF_SCATTER * counted.scatter, plan::MEAN_OF_SCATTER * read]
     }
 
     /// Direct light at the leaves.

@@ -7,6 +7,7 @@
 use super::gather::{Draw, Gather};
 use super::shares::{Kind, shares, turning_point};
 use super::{FIRST_PRECISION, Phase, Sampled};
+use crate::settings::DirectLight;
 use crate::solver::Event;
 use ondelette_compress::NodeId;
 
@@ -37,6 +38,9 @@ pub(super) const MOST_DIRECTIONS: f64 = 65_536.0;
 const GROWTH: f64 = 32.0;
 /// Mean absolute value of a misfit over its root mean square.
 pub(super) const MEAN_OF_MISFIT: f64 = 0.8;
+/// What gathering elements cannot say is more than their points see: legs and feet pass between them. Where direct light
+/// is gathered, nothing else is overrated to make up for it.
+const UNSEEN: f64 = 1.4;
 /// Mean root of the positive part of a scattered number of mean 0, over the root of its standard deviation.
 pub(super) const FLOOR: f64 = 0.4;
 /// A misfit larger than this many of its standard deviations is one.
@@ -118,9 +122,9 @@ impl Sampled {
                     local[node.first_child as usize + c] += local[n];
                 }
             } else {
-                let (direct, scatter) = self.direct_error(n);
+                let [direct, scatter, read] = self.direct_error(n);
                 let area = node.measure * f64::from(self.lit[n]);
-                together[node.cell.root as usize] += area * direct.hypot(local[n].hypot(scatter));
+                together[node.cell.root as usize] += area * direct.hypot(local[n].hypot(scatter)).hypot(read);
             }
         }
         together
@@ -143,7 +147,8 @@ impl Sampled {
                 }
             }
         }
-        MEAN_OF_MISFIT * sure.max(sum)
+        let more = if self.settings.direct == DirectLight::Gathered { UNSEEN } else { 1.0 };
+        more * MEAN_OF_MISFIT * sure.max(sum)
     }
 
     /// The kinds of error, as integrals: misfit and scatter of direct light, scatter of the gathered, and what its
@@ -152,7 +157,7 @@ impl Sampled {
         let (mut misfit, mut lamps) = (0.0, 0.0);
         for (n, node) in self.forest.nodes().iter().enumerate() {
             if node.first_child == 0 && self.counts(node.cell.root) {
-                let (own, scatter) = self.direct_error(n);
+                let [own, scatter, _] = self.direct_error(n);
                 let area = node.measure * f64::from(self.lit[n]);
                 misfit += area * own;
                 lamps += area * scatter;
@@ -234,7 +239,7 @@ impl Sampled {
         let mut total = 0.0;
         for (n, node) in self.forest.nodes().iter().enumerate() {
             if node.first_child == 0 && self.counts(node.cell.root) {
-                let missed = node.measure * f64::from(self.lit[n]) * self.direct_error(n).0;
+                let missed = node.measure * f64::from(self.lit[n]) * self.direct_error(n)[0];
                 total += missed;
                 if missed > 0.0 && node.cell.depth < DEEPEST {
                     worst.push((missed, n as u32));
@@ -274,7 +279,7 @@ impl Sampled {
         let mut total = 0.0;
         for (n, node) in self.forest.nodes().iter().enumerate() {
             if node.first_child == 0 && self.counts(node.cell.root) {
-                let scatter = node.measure * f64::from(self.lit[n]) * self.direct_error(n).1;
+                let scatter = node.measure * f64::from(self.lit[n]) * self.direct_error(n)[1];
                 if scatter > 0.0 {
                     total += scatter;
                     let one = scatter * f64::from(self.rays[n]).sqrt();

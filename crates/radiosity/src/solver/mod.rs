@@ -8,7 +8,7 @@ mod linked;
 
 use crate::sampled::Sampled;
 use crate::scene::{Paint, Scene};
-use crate::settings::{Method, Settings};
+use crate::settings::{DirectLight, Method, Settings};
 use crate::solution::Solution;
 use linked::Linked;
 pub use linked::MatrixTooLarge;
@@ -141,7 +141,7 @@ impl Solver {
     /// ```
     /// use ondelette_radiosity::{Method, Settings, Solver, scene::samples};
     /// let links = ondelette_radiosity::LinkSettings { subdivision: Some(3), ..Default::default() };
-    /// let settings = Settings { method: Method::Classical, basis: "haar".parse().unwrap(), links, error: 0.1 };
+    /// let settings = Settings { method: Method::Classical, basis: "haar".parse().unwrap(), links, error: 0.1, ..Settings::default() };
     /// let scene = || samples::facing_squares(1.0);
     /// let light = |cap| {
     ///     let mut solver = Solver::within(scene(), settings, cap)?;
@@ -250,6 +250,19 @@ impl Solver {
         match &mut self.0 {
             Engine::Linked(engine) => engine.promise(error),
             Engine::Sampled(engine) => engine.promise(error),
+        }
+        Ok(())
+    }
+
+    /// Lets direct light be read in another way from now on, for a solver that was resumed: the promise is for what is
+    /// read so.
+    ///
+    /// # Errors
+    /// Direct light is to be gathered of a method with links.
+    pub fn read_direct(&mut self, direct: DirectLight) -> Result<(), SolveError> {
+        match &mut self.0 {
+            Engine::Linked(engine) => Settings { direct, ..engine.settings() }.validated().map(|_| ())?,
+            Engine::Sampled(engine) => engine.read_direct(direct),
         }
         Ok(())
     }
