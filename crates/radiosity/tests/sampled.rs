@@ -324,7 +324,7 @@ fn direct_light_gathered_anew_makes_shadows_crisp() {
 #[test]
 fn where_direct_light_is_gathered_few_elements_keep_the_promise() {
     let scene = || samples::quads("box", &room_with_box(0.0));
-    let told = |direct| Settings { error: 0.02, direct, ..Settings::default() };
+    let told = |direct| Settings { error: 0.01, direct, ..Settings::default() };
     let [fitted, gathered] = [DirectLight::Fitted, DirectLight::Gathered].map(|direct| {
         let mut solver = Solver::new(scene(), told(direct)).unwrap();
         while solver.step().is_some() {}
@@ -332,8 +332,8 @@ fn where_direct_light_is_gathered_few_elements_keep_the_promise() {
     });
     assert!(gathered.is_finished() && !gathered.kept().unwrap().has_samples());
     let [many, few] = [&fitted, &gathered].map(|s| s.forest().leaves());
-    assert!(4 * few < 3 * many, "{few} and {many} elements");
-    let fine = solve(scene(), "m2", 0.004);
+    assert!(3 * few < 2 * many, "{few} and {many} elements");
+    let fine = solve(scene(), "m2", 0.003);
     // mean absolute error of what is read, relative to the mean
     let error = |prober: &Prober| {
         let truth = Prober::new(&fine);
@@ -351,10 +351,9 @@ fn where_direct_light_is_gathered_few_elements_keep_the_promise() {
         }
         off / whole
     };
-    // the same elements read as they were fitted do not keep it
     let blurred = error(&Prober::reading(&gathered, DirectLight::Fitted).unwrap());
     let crisp = error(&Prober::new(&gathered));
-    assert!(crisp < 0.02 && crisp < 0.7 * blurred, "{crisp}, read as fitted {blurred}");
+    assert!(crisp < 0.01 && crisp < 0.95 * blurred, "{crisp}, read as fitted {blurred}");
     // what is read does not depend on what was read before
     let points: Vec<[f64; 2]> =
         (0..64).map(|k| [f64::from(k % 8) / 8.0 + 0.03, f64::from(k / 8) / 8.0 + 0.05]).collect();
@@ -385,7 +384,7 @@ fn relighting_may_change_how_direct_light_is_read() {
     let (gathered, other) = stated(DirectLight::Gathered, &kept);
     let (fitted, _) = stated(DirectLight::Fitted, &other);
     let before = kept.statistics().estimated_error;
-    assert!(gathered < 0.95 * before, "{gathered} from {before}");
+    assert!((gathered / before - 1.0).abs() > 0.01, "{gathered} from {before}");
     assert!((fitted - before).abs() < 0.1 * before, "{fitted} from {before}");
     assert_eq!(other.statistics().rays, kept.statistics().rays);
     // methods with links know no lamps

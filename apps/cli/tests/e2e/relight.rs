@@ -68,6 +68,9 @@ fn what_cannot_be_lit_anew_is_refused() {
 fn gathered_direct_light_is_read_wherever_the_solution_is() {
     let place = Place::new();
     room(&place);
+    // something that casts a shadow
+    let shade = "v 0.7 0.7 0.4\nv 1.2 0.7 0.4\nv 1.2 1.2 0.4\nv 0.7 1.2 0.4\no shade\nusemtl grey\nf 9 10 11 12\n";
+    place.write("room.obj", format!("{}{shade}", crate::program::ROOM));
     place.run("light room.obj --error 5% --direct gather -o g.onl -o g.png -o g.glb --report g.json").with_code(0);
     let gathered = report(&place, "g.json");
     assert_eq!(gathered["settings"]["direct"], "gather");
