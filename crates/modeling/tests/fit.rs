@@ -269,3 +269,15 @@ fn a_tilt_that_no_point_sees_is_not_invented() {
         assert!(fit.converged && size < 5.0, "{count}: {size}");
     }
 }
+
+#[test]
+fn a_weight_that_loses_an_outline_is_blamed_and_no_point_is() {
+    let line: Vec<Vec<f64>> = (0..40).map(|i| vec![f64::from(i), (0.3 * f64::from(i)).sin()]).collect();
+    for weight in [1e-25, 1e-60] {
+        let settings = FitSettings { weight: Some(weight), stiffening: Some(0.0), ..FitSettings::default() };
+        match curve(&line, false, settings) {
+            Ok(fit) => assert!(!fit.converged || fit.rms < 1e-6, "{weight:e}: {:e}", fit.rms),
+            Err(e) => assert_eq!(e, FitError::Lost { weight, stiffening: 0.0 }),
+        }
+    }
+}
