@@ -168,6 +168,8 @@ fn heights_without_squares_are_refused() {
     let places: Vec<[f64; 2]> = (0..20).map(|i| [random(1, i), random(2, i)]).collect();
     let scatter = Scatter::new(places.clone(), vec![1e200; 20]).unwrap();
     assert_eq!(surface(&scatter, FitSettings::default()).unwrap_err(), FitError::Large(1e200));
+    let low = Scatter::new(places.clone(), places.iter().map(|p| 1e-200 * p[0]).collect()).unwrap();
+    assert!(matches!(surface(&low, FitSettings::default()), Err(FitError::Small(v)) if v < 1e-200));
     let outline: Vec<Vec<f64>> = places.iter().map(|p| vec![1e150 * p[0], p[1]]).collect();
     assert!(matches!(curve(&outline, false, FitSettings::default()), Err(FitError::Large(_))));
 }

@@ -4,7 +4,7 @@ use ondelette_modeling::Axis;
 use ondelette_modeling::constraint::{Constraint, Demand};
 use ondelette_modeling::energy::Energy;
 use ondelette_modeling::solve::{Method, Oracle, Settings, Solution, Solver};
-use ondelette_modeling::system::{Problem, Space};
+use ondelette_modeling::system::{Problem, ProblemError, Space};
 use ondelette_wavelet::Boundary;
 
 fn surface(boundary: Boundary, spans: usize) -> Space {
@@ -229,4 +229,18 @@ fn a_light_weight_hides_no_other_row() {
             assert!(off.fold(0.0, |m: f64, (a, b)| m.max((a - b).abs())) < 1e-6, "{weight:e}");
         }
     }
+}
+
+#[test]
+fn heights_whose_squares_are_nothing_are_refused() {
+    let of = |z: f64| {
+        let rows = vec![
+            Constraint::new("a", &[0.2, 0.3], Demand::Position(vec![Some(0.0)])),
+            Constraint::new("b", &[0.7, 0.6], Demand::Position(vec![Some(z)])),
+        ];
+        Problem::new(surface(Boundary::Open, 8), 1, Energy::BEND, None, rows)
+    };
+    assert_eq!(of(1e-200).unwrap_err(), ProblemError::Tiny(1e-200));
+    assert!(run(&of(1e-90).unwrap(), Method::Auto).converged());
+    assert!(run(&of(0.0).unwrap(), Method::Auto).converged());
 }

@@ -73,6 +73,9 @@ pub enum FitError {
     /// A height or coordinate whose square is no number.
     #[error("a value of {0:e} is too large: squares are summed, so scale the data to below 1e100")]
     Large(f64),
+    /// Heights that differ by so little that the squares are lost.
+    #[error("values differ by no more than {0:e}: squares are summed, so scale the data to above 1e-100")]
+    Small(f64),
     /// A point outside the domain.
     #[error("point {0} is outside the domain")]
     Outside(usize),
@@ -191,6 +194,10 @@ pub fn surface(data: &Scatter, settings: FitSettings) -> Result<Fit, FitError> {
     let side = ((domain[0][1] - domain[0][0]) * (domain[1][1] - domain[1][0])).sqrt();
     let mean = data.values.iter().sum::<f64>() / m as f64;
     let centred: Vec<f64> = data.values.iter().map(|v| v - mean).collect();
+    let most = centred.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+    if most > 0.0 && most < SMALLEST {
+        return Err(FitError::Small(most));
+    }
     let unit = m as f64 * side * side;
     let (mut weight, mut stiffening) = (settings.weight, settings.stiffening);
     let mut validation = None;
@@ -247,6 +254,9 @@ const FAINT: f64 = 1e-18;
 const DROWNED: f64 = 1e-18;
 /// Values above this have squares whose sums may be no numbers.
 pub(super) const LARGEST: f64 = 1e100;
+
+/// Values that differ by less than this have squares that may be nothing.
+const SMALLEST: f64 = 1e-100;
 
 /// Spans an axis for `m` points over a domain with such sides: about four cells a point, about as long as wide.
 fn spans_for(m: usize, sides: [f64; 2]) -> [usize; 2] {
