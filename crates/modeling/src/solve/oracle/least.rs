@@ -2,6 +2,7 @@
 
 use crate::solve::method::{Method, Settings};
 use crate::solve::refine::Solver;
+use crate::solve::solution::Solution;
 use crate::system::{Problem, Space};
 
 /// Sides of a cell that differ by this factor are not square any more.
@@ -24,11 +25,11 @@ pub(super) struct Least {
     pub(super) height: f64,
 }
 
-/// The least energy, by the solver that `auto` picks, or a sparse factor where that one fails.
+/// The least energy and its shape, by the solver that `auto` picks, or a sparse factor where that one fails.
 ///
 /// # Errors
 /// A sentence: they failed, or did not converge.
-pub(super) fn energy(problem: &Problem) -> Result<Least, String> {
+pub(super) fn energy(problem: &Problem) -> Result<(Least, Solution), String> {
     let solved = |method: Method| {
         let settings = Settings { method, tolerance: 1e-9, ..Settings::default() };
         Solver::new(problem.clone(), settings).and_then(Solver::run)
@@ -51,8 +52,9 @@ pub(super) fn energy(problem: &Problem) -> Result<Least, String> {
         let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
         0.5 * (high - low)
     };
-    Ok(Least {
+    let least = Least {
         energy: full.energy() + problem.rows().iter().filter(|r| r.give > 0.0).map(soft).sum::<f64>(),
         height: x.iter().map(height).fold(0.0, f64::max),
-    })
+    };
+    Ok((least, full))
 }

@@ -85,6 +85,9 @@ pub struct Oracle {
     excess: f64,
     /// The least energy, where it must be known, and how much closer iterations must come than they need elsewhere.
     least: Option<Least>,
+    /// Its shape, which stands in where rounding keeps the active functions from coming near it.
+    full: Option<Solution>,
+    instead: bool,
     share: f64,
     converged: bool,
 }
@@ -176,6 +179,8 @@ impl Oracle {
             last: Solved::default(),
             excess: f64::INFINITY,
             least: None,
+            full: None,
+            instead: false,
             share: 1.0,
             converged: false,
         })
@@ -296,7 +301,7 @@ impl Oracle {
         if self.least.is_none() && !least::cells_are_square(self.problem.space()) {
             // Nothing to compare with: the shape meets its rows, but nobody knows how near the least it is.
             match least::energy(&self.problem) {
-                Ok(least) => self.least = Some(least),
+                Ok((least, full)) => (self.least, self.full) = (Some(least), Some(full)),
                 Err(why) => {
                     self.notes.push(why);
                     return Ok(());
@@ -348,16 +353,23 @@ impl Oracle {
         let below = (BELOW * allowed).max(self.noise());
         let promised = self.promised();
         let is_real = energy >= -below && self.last.energy >= -below && self.written() <= energy + promised + below;
-        if !is_real {
-            self.notes
-                .push("rounding has taken the energy of the active functions: ask for a full solution".to_owned());
+        // Less than the least is rounding's, of the one or the other.
+        self.converged = is_real && self.excess <= promised;
+        self.excess = self.excess.max(0.0);
+        if !self.converged
+            && let Some(least) = self.least
+        {
+            self.notes.push("rounding keeps wavelets of such long cells apart: this is the full solution".to_owned());
+            (self.instead, self.converged, self.excess, self.last.energy) = (true, true, 0.0, least.energy);
             return Ok(());
         }
-        // Less than the least is rounding's, of the one or the other.
-        self.converged = self.excess <= promised;
-        self.excess = self.excess.max(0.0);
         if !self.converged {
-            self.notes.push("the active functions do not come as near to the least energy as was asked".to_owned());
+            let why = if is_real {
+                "the active functions do not come as near to the least energy as was asked"
+            } else {
+                "rounding has taken the energy of the active functions: ask for a full solution"
+            };
+            self.notes.push(why.to_owned());
             return Ok(());
         }
         let corner = self.active.corner();
@@ -456,6 +468,19 @@ impl Oracle {
     pub fn solution(&self) -> Solution {
         let problem = &self.problem;
         let mut coefficients = self.active.coefficients(problem.coordinates());
+        if let Some(full) = self.full.as_ref().filter(|_| self.instead) {
+            return Solution::new(
+                problem.space().clone(),
+                full.coefficients().to_vec(),
+                self.h.clone(),
+                full.residuals().to_vec(),
+                full.method(),
+                self.active.iterations + full.iterations(),
+                self.converged,
+                self.notes.clone(),
+            )
+            .adapted(problem.space().len(), self.excess);
+        }
         for (x, mean) in coefficients.iter_mut().zip(&self.means).filter(|e| *e.1 != 0.0) {
             x.iter_mut().for_each(|x| *x += mean);
         }
