@@ -337,3 +337,40 @@ fn low_heights_bend_as_they_are_asked_to() {
     let found = solve(64, Energy::BEND, 1, &flat);
     assert!(found.converged() && found.iterations() == 0, "{:?}", found.notes());
 }
+
+#[test]
+fn steep_heights_bend_as_they_are_asked_to() {
+    // Rounding of the second derivative was held against the curvature of a graph that is far less steep in it.
+    let points = [at("a", 0.0, &[0.0]), at("b", 0.5, &[5000.0]), at("c", 1.0, &[10000.0])];
+    for want in [1e-10, -3e-9] {
+        let found = solve(64, Energy::BEND, 1, &[&points[..], &[bent("k", 0.3, want)]].concat());
+        let miss = found.residuals().last().unwrap().miss;
+        assert!(found.converged(), "{want:e}: {:?}", found.notes());
+        assert!(miss.abs() < 1e-2 * want.abs(), "{want:e}: missed by {miss:e}");
+    }
+}
+
+#[test]
+fn places_in_space_that_would_bend_less_if_they_were_let_settle() {
+    // Pulled back against their bend, the next program turned them round, and the one after that.
+    let straight = [at("a", 0.0, &[0.0, 0.0, 0.0]), at("b", 1.0, &[1.0, 0.0, 0.0])];
+    let wave = [
+        at("a", 0.0, &[0.0, 0.0, 0.0]),
+        at("b", 1.0 / 3.0, &[1.0, 1.0, 0.0]),
+        at("c", 2.0 / 3.0, &[2.0, -1.0, 0.0]),
+        at("d", 1.0, &[3.0, 0.0, 0.0]),
+    ];
+    for (spans, place, points) in [(4, 0.4, &straight[..]), (8, 0.5, &wave[..])] {
+        let of = |k: &[f64]| {
+            let rows: Vec<Constraint> = k.iter().map(|k| bent("k", place, *k)).collect();
+            solve(spans, Energy::BEND, 3, &[points, &rows].concat())
+        };
+        let free = of(&[]).energy();
+        for k in [1e-6, 3e-6, 1e-5] {
+            let found = of(&[k]);
+            assert!(found.converged(), "{place} {k:e}: {:?}", found.notes());
+            assert!(worst(&found) < 1e-2 * k, "{place} {k:e}: {:e}", worst(&found));
+            assert!(found.energy() <= free + 1e3 * k * k, "{place} {k:e}: {:e} from {free:e}", found.energy());
+        }
+    }
+}

@@ -158,6 +158,9 @@ fn outline(plan: &FitPlan, points: &Points) -> Result<Fitted, String> {
     }
     let tolerance = plan.tolerance.ok_or("--fair needs --tolerance: how far a point may move")?;
     let list: Vec<Vec<f64>> = points.points.iter().map(|p| p[..points.dim].to_vec()).collect();
+    if list.len() > 4 && list.first() == list.last() && Format::of(&plan.data) != Some(Format::Dat) {
+        tell("note: the outline is closed; --fair makes an open curve of it, whose ends need not meet smoothly");
+    }
     let fair = fit::fair(&list, tolerance).map_err(|e| e.to_string())?;
     let x = fair.curve.coefficients();
     let control = (0..fair.curve.space().len()).map(|k| std::array::from_fn(|c| x.get(c).map_or(0.0, |x| x[k])));

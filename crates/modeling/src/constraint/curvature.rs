@@ -154,6 +154,11 @@ impl Seen {
         self.found.as_ref().map(|f| f.0 - self.want).filter(|m| m.is_finite())
     }
 
+    /// True where there is less curvature than is wanted.
+    pub(crate) fn is_less(&self) -> bool {
+        self.found.as_ref().is_some_and(|f| f.0.abs() < self.want.abs())
+    }
+
     /// The miss that is as good as none, with a share of the curvature wanted, or of the [`usual`] one of the shape.
     pub(crate) fn allowed(&self, share: f64, usual: f64) -> f64 {
         (share * self.want.abs().max(usual)).max(self.noise)
@@ -161,8 +166,8 @@ impl Seen {
 
     /// The hard row around this curve, and soft ones that hold the derivatives where `force` times the curvature bends
     /// upwards: the part of Newton's matrix that may be added to the energy without losing its least. Next to straight
-    /// beside the [`usual`] curvature of the shape, in space: two hard rows.
-    pub(crate) fn rows(&self, force: Force, usual: f64, out: &mut Vec<Row>) {
+    /// beside the [`usual`] curvature of the shape, in space: two hard rows; `held` where it would bend less.
+    pub(crate) fn rows(&self, force: Force, usual: f64, held: bool, out: &mut Vec<Row>) {
         let Some((k, by1, by2)) = &self.found else { return };
         let n = self.d1.len();
         let terms = |first: &[f64], second: &[f64]| {
@@ -174,11 +179,13 @@ impl Seen {
             (0..n).map(|i| first[i] * self.d1[i] + second[i] * self.d2[i]).sum()
         };
         if n == 3 && self.want.abs() <= STRAIGHT * usual {
-            // It bends the way it is pulled; at first, the way it is bent.
+            // It bends the way it is pulled; at first, the way it is bent. What would bend less if it was let is pulled
+            // back the other way, and keeps its own.
             let both = parts(&self.d1, &self.d2);
+            let bent = [both[0].0, both[1].0];
             let pull = match force {
-                Force::Two(pull) => pull,
-                _ => [both[0].0, both[1].0],
+                Force::Two(pull) if !held => pull,
+                _ => bent,
             };
             let size = f64::hypot(pull[0], pull[1]);
             for ((k, by1, by2), pull) in both.into_iter().zip(pull) {
@@ -243,8 +250,12 @@ pub(crate) fn look(problem: &Problem, coefficients: &[Vec<f64>]) -> Vec<Seen> {
         let speed = d1.iter().map(|v| v * v).sum::<f64>().sqrt();
         let collapsed = d1.len() > 1 && speed <= COLLAPSED * size * length_of(&one);
         let found = curvature(&d1, &d2).filter(|_| !collapsed);
-        let noise = match coefficients {
-            [x] => ROUNDING * two.entries().map(|(i, v)| (v * x[i]).abs()).sum::<f64>(),
+        // That of the derivatives, as far as curvature feels them: of a second one little where the graph is steep.
+        let noise = match (coefficients, &found) {
+            ([x], Some((_, by1, by2))) => {
+                let of = |f: &Functional| f.entries().map(|(i, v)| (v * x[i]).abs()).sum::<f64>();
+                ROUNDING * (by1[0].abs() * of(&one) + by2[0].abs() * of(&two))
+            }
             _ => 0.0,
         };
         out.push(Seen { constraint, want, one, two, d1, d2, noise, found });

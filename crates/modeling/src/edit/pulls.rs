@@ -121,12 +121,14 @@ fn solve(
         let (multipliers, misses) = factor.solve(&wish);
         let size = used.iter().map(|&k| now[k][c].abs().max(pulls[k].target[c].unwrap_or(0.0).abs()));
         let size = size.fold(1e-300, f64::max);
-        for (&k, &miss) in used.iter().zip(&misses) {
-            if miss.abs() > 1e-9 * size {
-                return Err(EditError::Conflict { pull: k, miss: miss.abs() });
-            }
-            pulled.residual = pulled.residual.max(miss.abs());
+        // Who contradicts is a pull that was left out for those before it, or else the last that was not.
+        let is_missed = |r: &usize| misses[*r].is_nan() || misses[*r].abs() > 1e-9 * size;
+        let last = factor.kept.last().copied().filter(|_| factor.kept.iter().any(is_missed));
+        if let Some(r) = factor.dropped.iter().copied().find(is_missed).or(last) {
+            let miss = misses.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+            return Err(EditError::Conflict { pull: used[r], miss });
         }
+        pulled.residual = misses.iter().fold(pulled.residual, |m, v| m.max(v.abs()));
         pulled.redundant.extend(factor.dropped.iter().map(|&k| used[k]));
         changes.push((c, used, multipliers));
     }

@@ -61,7 +61,12 @@ impl Data<'_> {
         let energy = Energy::new(weight * stiffening * stiffening, weight, 0.0)?;
         let k = self.points[0].len();
         let problem = Problem::new(Space::curve(self.axis), k, energy, None, rows).map_err(SolveError::Problem)?;
-        Ok(Solver::new(problem, Settings { method: Method::Banded, ..Settings::default() })?.run()?)
+        let solver = Solver::new(problem, Settings { method: Method::Banded, ..Settings::default() })?;
+        // Points are no constraints of the user's, who gave the weight if anything.
+        solver.run().map_err(|e| match e {
+            SolveError::Degenerate { .. } | SolveError::Method { .. } => FitError::Lost { weight, stiffening },
+            e => e.into(),
+        })
     }
 }
 

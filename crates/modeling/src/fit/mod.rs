@@ -5,6 +5,7 @@ mod choose;
 mod curve;
 mod fair;
 mod normal;
+mod plane;
 mod surface;
 
 pub use curve::{CurveFit, curve};

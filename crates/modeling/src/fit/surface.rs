@@ -6,6 +6,7 @@
 
 use super::choose::{BEGIN, STEPS, search};
 use super::normal::Normal;
+use super::plane::{is_line, take_off};
 use crate::axis::{Axis, AxisError};
 use crate::basis;
 use crate::energy::{Energy, EnergyError, Operator};
@@ -72,6 +73,9 @@ pub enum FitError {
     /// A height or coordinate whose square is no number.
     #[error("a value of {0:e} is too large: squares are summed, so scale the data to below 1e100")]
     Large(f64),
+    /// Heights that differ by so little that the squares are lost.
+    #[error("values differ by no more than {0:e}: squares are summed, so scale the data to above 1e-100")]
+    Small(f64),
     /// A point outside the domain.
     #[error("point {0} is outside the domain")]
     Outside(usize),
@@ -95,6 +99,12 @@ pub enum FitError {
         /// Square root of stretch over bend.
         stiffening: f64,
     },
+    /// Points that leave the tilt across their line to nothing.
+    #[error(
+        "all points lie on a line: what is as high as they are there may tilt across it as it likes; give a stiffening \
+         above 0, or none to have it chosen"
+    )]
+    Line,
     /// Spans that cannot be solved on.
     #[error("{0} spans: give a power of two from 4 to 1024")]
     Spans(usize),
@@ -177,9 +187,17 @@ pub fn surface(data: &Scatter, settings: FitSettings) -> Result<Fit, FitError> {
             return Err(EnergyError::Weight { name, value }.into());
         }
     }
+    let line = is_line(&data.points);
+    if line && settings.stiffening == Some(0.0) && m > 1 {
+        return Err(FitError::Line);
+    }
     let side = ((domain[0][1] - domain[0][0]) * (domain[1][1] - domain[1][0])).sqrt();
     let mean = data.values.iter().sum::<f64>() / m as f64;
     let centred: Vec<f64> = data.values.iter().map(|v| v - mean).collect();
+    let most = centred.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+    if most > 0.0 && most < SMALLEST {
+        return Err(FitError::Small(most));
+    }
     let unit = m as f64 * side * side;
     let (mut weight, mut stiffening) = (settings.weight, settings.stiffening);
     let mut validation = None;
@@ -201,17 +219,23 @@ pub fn surface(data: &Scatter, settings: FitSettings) -> Result<Fit, FitError> {
         }
     }
     let weight = weight.unwrap_or(1e-9 * unit);
-    let stiffening = stiffening.unwrap_or(0.0);
-    let whole = Part::new(space.clone(), data.points.clone(), centred, side);
+    let stiffening = stiffening.unwrap_or(if line { 1.0 } else { 0.0 });
+    let (mut rest, mut off) = (centred, vec![0.0; space.len()]);
+    if stiffening == 0.0 {
+        off = take_off(&space, &data.points, &mut rest);
+    }
+    // The B-splines sum to one.
+    off.iter_mut().for_each(|v| *v += mean);
+    let mut whole = Part::new(space.clone(), data.points.clone(), rest, side);
+    whole.off = off.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
     let mut all = whole.fold(&|_| false);
-    if let Some(start) = start.filter(|x| x.len() == all.x.len()) {
+    if let Some(start) = start.filter(|x| x.len() == all.x.len() && stiffening > 0.0) {
         all.x = start;
     }
     let converged = whole.settle(&mut all, weight, stiffening)?;
     let miss = |i: usize| eval(&space, &all.x, data.points[i]) - whole.values[i];
     let rms = ((0..m).map(|i| miss(i).powi(2)).sum::<f64>() / m as f64).sqrt();
-    // The B-splines sum to one.
-    let coefficients = all.x.iter().map(|v| v + mean).collect();
+    let coefficients = all.x.iter().zip(off).map(|(v, off)| v + off).collect();
     Ok(Fit { space, coefficients, weight, stiffening, rms, validation, converged })
 }
 
@@ -223,10 +247,16 @@ const SETTLED: f64 = 1e-8;
 const SLACK: f64 = 1e3;
 /// Coefficients are rounded to this share of their size.
 const ROUNDING: f64 = 1e-15;
+/// No sum needs to be nearer to its least than this share of what the data would have if nothing was fitted, or an even
+/// bend as high: shapes differ by the root of it.
+const FAINT: f64 = 1e-18;
 /// An energy whose largest entry is this share of the data's is lost in their rounding.
 const DROWNED: f64 = 1e-18;
 /// Values above this have squares whose sums may be no numbers.
 pub(super) const LARGEST: f64 = 1e100;
+
+/// Values that differ by less than this have squares that may be nothing.
+const SMALLEST: f64 = 1e-100;
 
 /// Spans an axis for `m` points over a domain with such sides: about four cells a point, about as long as wide.
 fn spans_for(m: usize, sides: [f64; 2]) -> [usize; 2] {
@@ -242,7 +272,7 @@ fn spans_for(m: usize, sides: [f64; 2]) -> [usize; 2] {
     if aspect > 0.0 { [long, short] } else { [short, long] }
 }
 
-fn eval(space: &Space, x: &[f64], p: [f64; 2]) -> f64 {
+pub(super) fn eval(space: &Space, x: &[f64], p: [f64; 2]) -> f64 {
     let axes = space.axes();
     let (s, t, n) = (basis::taps(&axes[0], p[0], 0), basis::taps(&axes[1], p[1], 0), axes[1].len());
     s.iter().map(|(i, v)| v * t.apply(&x[i * n..][..n])).sum()
@@ -254,6 +284,8 @@ struct Part {
     spaces: Vec<Space>,
     points: Vec<[f64; 2]>,
     values: Vec<f64>,
+    /// The height of what was taken off the values.
+    off: f64,
     /// Side of the whole domain.
     side: f64,
     folds: Vec<Fold>,
@@ -270,7 +302,7 @@ impl Part {
         while let Some(next) = coarser(&spaces[spaces.len() - 1]).filter(|_| spaces[spaces.len() - 1].len() > 60) {
             spaces.push(next);
         }
-        Part { spaces, points, values, side, folds: Vec::new() }
+        Part { spaces, points, values, off: 0.0, side, folds: Vec::new() }
     }
 
     /// The whole domain with ten folds; or, where there are many points, windows of it with the same knots, as dense as
@@ -365,7 +397,8 @@ impl Part {
     ///
     /// What the sum may be above its least is measured by the energy: misses alone would leave free what no point is
     /// near. Beside it counts the energy of a shape that is bent evenly over the domain, as high as the data, because
-    /// planes have none.
+    /// planes have none. Of data that are met exactly neither is left: there it is a share of what the data would
+    /// have, and the rounding of heights as they are given.
     fn settle(&self, fold: &mut Fold, weight: f64, stiffening: f64) -> Result<bool, FitError> {
         let (h, mut cycle) = self.prepare(fold, weight, stiffening)?;
         let squares: f64 = self.values.iter().map(|v| v * v).sum();
@@ -376,8 +409,9 @@ impl Part {
             let miss = |(p, v): (&[f64; 2], &f64)| (eval(&self.spaces[0], x, *p) - v).powi(2);
             let misses: f64 = self.points.iter().zip(&self.values).map(miss).sum();
             let energy = h.energy(x);
-            let size = x.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
-            (SETTLED * (misses + energy).min(energy.max(even))).max((ROUNDING * size).powi(2) * trace)
+            let size = self.off + x.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+            let least = (FAINT * squares.min(even)).max((ROUNDING * size).powi(2) * trace);
+            (SETTLED * (misses + energy).min(energy.max(even))).max(least)
         };
         Ok(cycle.settle(&fold.right, &mut fold.x, 1e-8, MOST, &goal, SLACK))
     }

@@ -4,7 +4,7 @@ use super::bpx;
 use super::method::Method;
 use super::refine::{SolveError, Solver, Stage};
 use crate::energy::Operator;
-use crate::system::{MEMORY, Problem, ProblemError, Structure};
+use crate::system::{MEMORY, Problem, ProblemError, Space, Structure};
 use ondelette_wavelet::Boundary;
 
 /// Coefficients of the coarsest level up to which its dense factor costs next to nothing.
@@ -30,6 +30,9 @@ pub(crate) const CYCLES: usize = 100;
 
 /// Unknowns that a sparse factor is made for unasked.
 const LARGE: usize = 400_000;
+
+/// Sides of a cell that differ by more than this are too long for levels that halve both axes.
+const LONG: f64 = 2.5;
 
 /// The rule of [`Method::Auto`], and what each method needs.
 pub(crate) fn choose(problem: &Problem, h: &Operator, asked: Method) -> Result<(Method, &'static str), SolveError> {
@@ -93,12 +96,15 @@ pub(crate) fn fits(structure: &Structure, method: Method) -> Result<(), ProblemE
     Err(ProblemError::Memory { what, bytes, limit: MEMORY })
 }
 
-/// What a sparse factor gives way to where crowded constraints are too much for it.
+/// What a choice by rule gives way to where it does not converge.
 pub(crate) fn spare(problem: &Problem, chosen: Method) -> Option<(Method, &'static str)> {
     let space = problem.space();
     match chosen {
         Method::Multigrid if space.len() * problem.coordinates() <= LARGE => {
             Some((Method::Cholesky, "a surface with very many constraints, too uneven for multigrid"))
+        }
+        Method::Bpx if space.len() * problem.coordinates() <= LARGE => {
+            Some((Method::Cholesky, "constraints or cells too uneven for levels"))
         }
         Method::Cholesky if space.is_curve() => Some((Method::Banded, "a curve with crowded constraints")),
         Method::Cholesky if rows(problem) > CROWD => None,
@@ -144,10 +150,20 @@ fn sparse_or_levels(problem: &Problem, h: &Operator) -> Result<(Method, &'static
     if coarsest > COARSE && n <= SMALL {
         return Ok((Method::Cholesky, "spans that do not halve often"));
     }
+    if cells_are_long(problem.space()) && n * problem.coordinates() <= LARGE {
+        return Ok((Method::Cholesky, "cells far from square"));
+    }
     if !h.is_uniform() && n <= STIFF {
         return Ok((Method::Cholesky, "varying stiffness on few spans"));
     }
     Ok((Method::Bpx, "open axes or varying stiffness"))
+}
+
+/// True for surfaces whose cells are much longer one way: the energy of a long cell is that of its short side, and what
+/// waves along the long one is lost beside it to whatever smooths both at once.
+fn cells_are_long(space: &Space) -> bool {
+    let [s, t] = space.axes() else { return false };
+    !(1.0 / LONG..=LONG).contains(&(s.density() / t.density()))
 }
 
 #[cfg(test)]
@@ -157,7 +173,6 @@ mod tests {
     use crate::constraint::{Constraint, Demand};
     use crate::energy::Energy;
     use crate::solve::Settings;
-    use crate::system::Space;
 
     fn solver(spans: usize, points: usize) -> Solver {
         let axis = Axis::new(Boundary::Open, spans, [0.0, 1.0]).unwrap();

@@ -9,7 +9,8 @@
 //! [ Y^T  0 ] [ c ] = [ Z^T r     ]
 //! ```
 //!
-//! S is factored with `tau Y Y^T` added, which changes no solution and makes it positive definite.
+//! Rows of light weights, whose 1 / w is all that is to be seen in S, would hide the others: they are scaled by a
+//! power of two, which costs no digits. S is factored with `tau Y Y^T` added, which changes no solution and makes it positive definite.
 
 use super::cholesky::{Cholesky, dot, start};
 
@@ -18,7 +19,9 @@ use super::cholesky::{Cholesky, dot, start};
 pub(crate) struct Border {
     k: usize,
     tau: f64,
-    /// Y, one column after the other.
+    /// What each row is multiplied by.
+    scales: Vec<f64>,
+    /// Y, scaled, one column after the other.
     y: Vec<Vec<f64>>,
     /// L^-1 Y.
     u: Vec<Vec<f64>>,
@@ -29,10 +32,26 @@ pub(crate) struct Border {
     pub(crate) free: Vec<Vec<f64>>,
 }
 
+/// Rows whose diagonal is this many times the least would hide those that it is of.
+const LIGHT: f64 = 1e6;
+
+/// Powers of two that scale the diagonal of S, where a weight has made it large, to about the least of all.
+fn scales(s: &[f64], m: usize) -> Vec<f64> {
+    let own = |i: usize| s[start(i) + i];
+    let least = (0..m).map(own).filter(|v| *v > 0.0).fold(f64::INFINITY, f64::min);
+    let of = |own: f64| if own > LIGHT * least { (0.5 * (least / own).log2()).round().exp2() } else { 1.0 };
+    (0..m).map(|i| of(own(i))).collect()
+}
+
 impl Border {
     /// Factors S (packed) with the columns of Y. An error names the first row without a pivot.
-    pub(crate) fn new(mut s: Vec<f64>, m: usize, y: Vec<Vec<f64>>) -> Result<Border, usize> {
+    pub(crate) fn new(mut s: Vec<f64>, m: usize, mut y: Vec<Vec<f64>>) -> Result<Border, usize> {
         let k = y.len();
+        let scales = scales(&s, m);
+        for i in 0..m {
+            s[start(i)..start(i + 1)].iter_mut().zip(&scales).for_each(|(s, by)| *s *= scales[i] * by);
+        }
+        y.iter_mut().for_each(|y| y.iter_mut().zip(&scales).for_each(|(y, by)| *y *= by));
         let trace: f64 = (0..m).map(|i| s[start(i) + i]).sum();
         let norm: f64 = y.iter().map(|y| dot(y, y)).sum();
         let tau = if norm > 0.0 { k as f64 * trace / norm } else { 0.0 };
@@ -46,7 +65,7 @@ impl Border {
             }
         }
         let factor = Cholesky::new(&s, m)?;
-        let mut border = Border { k, tau, y, u: Vec::new(), factor, small: Vec::new(), free: Vec::new() };
+        let mut border = Border { k, tau, scales, y, u: Vec::new(), factor, small: Vec::new(), free: Vec::new() };
         border.finish();
         Ok(border)
     }
@@ -55,20 +74,21 @@ impl Border {
     /// `least[row]`, in the norm that the factor works in, and above rounding.
     pub(crate) fn independent(s: &[f64], y: &[Vec<f64>], least: &[f64]) -> Vec<usize> {
         let m = least.len();
-        let trace: f64 = (0..m).map(|i| s[start(i) + i]).sum();
-        let norm: f64 = y.iter().map(|y| dot(y, y)).sum();
+        let by = scales(s, m);
+        let trace: f64 = (0..m).map(|i| by[i] * by[i] * s[start(i) + i]).sum();
+        let norm: f64 = y.iter().flat_map(|y| y.iter().zip(&by)).map(|(y, by)| (y * by).powi(2)).sum();
         let tau = if norm > 0.0 { y.len() as f64 * trace / norm } else { 0.0 };
         let mut kept: Vec<usize> = Vec::new();
         let mut matrix: Vec<f64> = Vec::new();
         let mut factor = Cholesky::default();
         for i in 0..m {
-            let of = |j: usize| s[start(i) + j] + tau * y.iter().map(|y| y[i] * y[j]).sum::<f64>();
+            let of = |j: usize| by[i] * by[j] * (s[start(i) + j] + tau * y.iter().map(|y| y[i] * y[j]).sum::<f64>());
             matrix.truncate(start(kept.len()));
             matrix.extend(kept.iter().map(|j| of(*j)));
             let own = of(i);
             matrix.push(own);
             let grown = factor.extend(&matrix, kept.len() + 1).is_ok();
-            if grown && factor.pivot(kept.len()).powi(2) > least[i].max(2e-16 * own) {
+            if grown && factor.pivot(kept.len()).powi(2) > (by[i] * by[i] * least[i]).max(2e-16 * own) {
                 kept.push(i);
             } else {
                 factor.truncate(kept.len());
@@ -115,6 +135,7 @@ impl Border {
     /// Solves for v (over `h`, which holds A P r - d) and c, given `q` = Z^T r.
     pub(crate) fn solve(&self, h: &mut [f64], q: &[f64], c: &mut [f64]) {
         let k = self.k;
+        h.iter_mut().zip(&self.scales).for_each(|(h, by)| *h *= by);
         if self.tau > 0.0 {
             for (y, q) in self.y.iter().zip(q) {
                 h.iter_mut().zip(y).for_each(|(h, y)| *h += self.tau * q * y);
@@ -133,5 +154,6 @@ impl Border {
             h.iter_mut().zip(u).for_each(|(h, u)| *h += c * u);
         }
         self.factor.backward(h);
+        h.iter_mut().zip(&self.scales).for_each(|(h, by)| *h *= by);
     }
 }

@@ -23,6 +23,8 @@ pub(super) struct Curving {
     last: Vec<(f64, Vec<f64>)>,
     /// Price of a miss, constraint by constraint.
     price: Vec<f64>,
+    /// True for constraints without which the shape would be bent less where they are.
+    held: Vec<bool>,
     /// Soft rows of the problem.
     soft: Vec<Row>,
     /// The last way, if it was gone in one whole step.
@@ -87,7 +89,8 @@ impl Solver {
             let energy = self.energy(&to, &soft);
             let price = vec![0.0; misses.as_ref().map_or(0, Vec::len)];
             let last = vec![(energy, misses.unwrap_or_default())];
-            return self.program(Curving { from: to, last, price, soft, way: None });
+            let held = curvature::look(&self.problem, &to).iter().map(curvature::Seen::is_less).collect();
+            return self.program(Curving { from: to, last, price, held, soft, way: None });
         };
         if !self.converged || !finite {
             self.notes.truncate(said);
@@ -158,8 +161,9 @@ impl Solver {
         let mut rows = self.problem.rows();
         let linear = rows.len();
         let usual = curvature::usual(&self.problem, &curving.from);
-        for (seen, force) in curvature::look(&self.problem, &curving.from).iter().zip(forces) {
-            seen.rows(force, usual, &mut rows);
+        let seen = curvature::look(&self.problem, &curving.from);
+        for ((seen, force), held) in seen.iter().zip(forces).zip(&curving.held) {
+            seen.rows(force, usual, *held, &mut rows);
         }
         // What bends next to nothing only makes factors worse.
         let most = self.h.trace() / self.problem.space().len() as f64 * FAINT;

@@ -13,6 +13,8 @@ use std::sync::Arc;
 /// The levels of H + sum of weighted squares of rows, finest first.
 pub(crate) struct Cycle {
     levels: Vec<Level>,
+    /// What the factor is of, where there is nothing else.
+    only: Option<Box<Level>>,
     transfers: Vec<Transfer>,
     coarse: Coarsest,
     k: usize,
@@ -131,6 +133,33 @@ impl SparseRows {
 }
 
 impl Level {
+    fn new(h: Operator, rows: SparseRows, weights: Arc<Vec<f64>>, data: Option<Arc<Normal>>, k: usize) -> Level {
+        let n = h.len();
+        let mut diagonal: Vec<f64> = h.diagonal().repeat(k);
+        for (r, w) in weights.iter().enumerate() {
+            // repeated columns of short axes add before they are squared; this bound is on the safe side
+            rows.row(r).for_each(|(c, v)| diagonal[c] += w * v * v);
+        }
+        if let Some(data) = &data {
+            diagonal.iter_mut().zip(data.diagonal()).for_each(|(d, v)| *d += v);
+        }
+        let zeros = vec![0.0; n * k];
+        Level {
+            h,
+            n,
+            rows: Arc::new(rows),
+            weights,
+            data,
+            inverse: diagonal.into_iter().map(|d| 1.0 / d).collect(),
+            largest: 1.0,
+            b: zeros.clone(),
+            x: zeros.clone(),
+            d: zeros.clone(),
+            t: zeros,
+            scratch: Scratch::default(),
+        }
+    }
+
     /// `y = (H + A^T W A) x`.
     fn apply(&mut self, x: &[f64], y: &mut [f64]) {
         for (x, y) in x.chunks_exact(self.n).zip(y.chunks_exact_mut(self.n)) {
@@ -222,39 +251,18 @@ impl Cycle {
             }
             let coarser = if data.is_empty() { now.coarser() } else { coarser(&now) }.filter(|_| n > 60);
             let Some(coarser) = coarser else {
-                let data = data.get(levels.len());
-                let coarse = match (structure, data) {
+                let data = data.get(levels.len()).cloned();
+                let coarse = match (structure, &data) {
                     (None, Some(data)) if n > 60 => strip(&operator, data)?,
                     _ if n * k > 3000 => return None,
                     (None, None) => Coarsest::Dense(dense_factor(&operator, energy)?),
-                    _ => Coarsest::Dense(coarsest(&operator, &rows, &weights, k, data.map(|d| &**d))?),
+                    _ => Coarsest::Dense(coarsest(&operator, &rows, &weights, k, data.as_deref())?),
                 };
-                return Some(Cycle { levels, transfers, coarse, k, work: Vec::new() });
+                let only = levels.is_empty().then(|| Box::new(Level::new(operator, rows, weights, data, k)));
+                return Some(Cycle { levels, only, transfers, coarse, k, work: Vec::new() });
             };
-            let mut diagonal: Vec<f64> = operator.diagonal().repeat(k);
-            for (r, w) in weights.iter().enumerate() {
-                // repeated columns of short axes add before they are squared; this bound is on the safe side
-                rows.row(r).for_each(|(c, v)| diagonal[c] += w * v * v);
-            }
             let data = data.get(levels.len()).cloned();
-            if let Some(data) = &data {
-                diagonal.iter_mut().zip(data.diagonal()).for_each(|(d, v)| *d += v);
-            }
-            let zeros = vec![0.0; n * k];
-            let mut level = Level {
-                h: operator,
-                n,
-                rows: Arc::new(rows),
-                weights: weights.clone(),
-                data,
-                inverse: diagonal.into_iter().map(|d| 1.0 / d).collect(),
-                largest: 1.0,
-                b: zeros.clone(),
-                x: zeros.clone(),
-                d: zeros.clone(),
-                t: zeros,
-                scratch: Scratch::default(),
-            };
+            let mut level = Level::new(operator, rows, weights.clone(), data, k);
             level.largest = largest(&mut level);
             levels.push(level);
             transfers.push(Transfer::between(&coarser, &now));
@@ -267,7 +275,7 @@ impl Cycle {
 
     /// `y = (H + A^T W A) x` on the finest level.
     pub(crate) fn apply(&mut self, x: &[f64], y: &mut [f64]) {
-        if let Some(level) = self.levels.first_mut() {
+        if let Some(level) = self.levels.first_mut().or(self.only.as_deref_mut()) {
             level.apply(x, y);
         }
     }

@@ -15,8 +15,8 @@ const ROUNDS: usize = 6;
 const BELOW: f64 = 0.1;
 
 /// The tridiagonal matrix of Lanczos's method, from the steps of conjugate gradients.
-#[derive(Default)]
-struct Lanczos {
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Lanczos {
     diagonal: Vec<f64>,
     /// Squares of the entries beside it.
     beside: Vec<f64>,
@@ -25,7 +25,7 @@ struct Lanczos {
 
 impl Lanczos {
     /// A step of length `alpha`, after which the squared residual is `beta` times what it was.
-    fn push(&mut self, alpha: f64, beta: f64) {
+    pub(crate) fn push(&mut self, alpha: f64, beta: f64) {
         let (a, b) = self.last.map_or((0.0, 0.0), |(alpha, beta)| (beta / alpha, beta / alpha / alpha));
         self.diagonal.push(1.0 / alpha + a);
         if self.last.is_some() {
@@ -45,7 +45,7 @@ impl Lanczos {
     }
 
     /// The least eigenvalue within 5 percent; 1, what a cycle aims at, where it is not below.
-    fn least(&self) -> f64 {
+    pub(crate) fn least(&self) -> f64 {
         let (mut low, mut high) = (-80.0_f64, 0.0_f64);
         if self.is_above(1.0) {
             return 1.0;
@@ -89,17 +89,19 @@ impl Cycle {
         goal: &dyn Fn(&[f64]) -> f64,
         slack: f64,
     ) -> bool {
-        if self.is_direct() {
-            self.cycle(b, x);
-            return true;
-        }
         let mut least = 1.0;
         let mut aim = Aim::Relative(tolerance);
         let mut iterations = 0;
         let (mut r, mut z) = (vec![0.0; b.len()], vec![0.0; b.len()]);
-        let mut before = f64::INFINITY;
+        // What is left, the best so far.
+        let (mut before, mut best) = (f64::INFINITY, x.to_vec());
         for _ in 0..ROUNDS {
-            iterations += self.iterate(b, x, &aim, most - iterations, &mut least).1;
+            iterations += if self.is_direct() {
+                self.correct(b, x, &mut r, &mut z);
+                1
+            } else {
+                self.iterate(b, x, &aim, most - iterations, &mut least).1
+            };
             self.apply(x, &mut r);
             r.iter_mut().zip(b).for_each(|(r, b)| *r = b - *r);
             self.cycle(&r, &mut z);
@@ -107,12 +109,26 @@ impl Cycle {
             if left <= goal {
                 return true;
             }
-            if iterations >= most || left.is_nan() || left > 0.5 * before {
-                return left <= slack * goal;
+            let stuck = left.is_nan() || left > 0.5 * before;
+            if left < before {
+                (before, best) = (left, x.to_vec());
             }
-            (aim, before) = (Aim::Energy(BELOW * goal), left);
+            if iterations >= most || stuck {
+                break;
+            }
+            aim = Aim::Energy(BELOW * goal);
         }
+        // Rounds that rounding spoils make it worse.
+        x.copy_from_slice(&best);
         before <= slack * goal(x)
+    }
+
+    /// One solution by the factor, of what is missing.
+    fn correct(&mut self, b: &[f64], x: &mut [f64], r: &mut [f64], z: &mut [f64]) {
+        self.apply(x, r);
+        r.iter_mut().zip(b).for_each(|(r, b)| *r = b - *r);
+        self.cycle(r, z);
+        x.iter_mut().zip(&*z).for_each(|(x, z)| *x += z);
     }
 
     /// Whether the aim was reached, and in how many iterations; `least` follows the least Ritz value.

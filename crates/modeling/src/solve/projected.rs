@@ -7,6 +7,7 @@
 use super::border::Border;
 use super::cholesky::{dot, start};
 use super::correct::Correct;
+use super::gradients::Lanczos;
 use super::green::{Green, Inverse};
 use crate::energy::{Hessian, Scratch};
 use crate::system::Structure;
@@ -40,6 +41,10 @@ pub(crate) struct Projected {
     held: Vec<f64>,
     rg: f64,
     goal: f64,
+    /// The steps of the current correction, and the least eigenvalue that those of all have met: the energy left is
+    /// that many times less than r g at worst.
+    steps: Lanczos,
+    least: f64,
     /// True where the goal is an energy; then what is recent: r g, oldest first, and what the last step brought.
     aimed: bool,
     recent: Vec<f64>,
@@ -55,6 +60,10 @@ pub(crate) struct Projected {
 
 /// Iterations without a halved residual after which rounding has the word.
 const PATIENCE: usize = 2000;
+
+/// A step is no longer than one over the least eigenvalue of preconditioner times matrix; one that would be has
+/// nothing but rounding for a curvature.
+const LONGEST: f64 = 1e14;
 
 /// Steps by which it is judged how many are to come.
 const RECENT: usize = 8;
@@ -169,6 +178,8 @@ impl Projected {
             held: Vec::new(),
             rg: 0.0,
             goal: 0.0,
+            steps: Lanczos::default(),
+            least: 1.0,
             aimed: false,
             recent: Vec::new(),
             gain: 0.0,
@@ -315,12 +326,23 @@ impl Projected {
         }
     }
 
-    fn finished(&self) -> bool {
+    fn finished(&mut self) -> bool {
         let lost = self.iterations > self.best_at + PATIENCE;
         if self.aimed && self.rg <= self.goal && self.left() > SLACK * self.goal {
             return lost || self.iterations >= self.most;
         }
-        !(self.rg > self.goal && self.rg.is_finite()) || lost || self.iterations >= self.most
+        if lost || self.iterations >= self.most || !self.rg.is_finite() {
+            return true;
+        }
+        if self.rg > self.goal {
+            return false;
+        }
+        if self.aimed || !self.h.is_surface() {
+            return true;
+        }
+        // Known only now, when it matters.
+        self.least = self.least.min(self.steps.least());
+        self.rg <= (self.goal * self.least).max(self.noise())
     }
 
     fn iterate(&mut self) -> bool {
@@ -330,6 +352,9 @@ impl Projected {
             return true;
         }
         let alpha = self.rg / curvature;
+        if alpha > LONGEST {
+            return true;
+        }
         self.x.iter_mut().zip(&self.p).for_each(|(x, p)| *x += alpha * p);
         self.r.iter_mut().zip(&self.hp).for_each(|(r, h)| *r -= alpha * h);
         let old = self.rg;
@@ -342,6 +367,9 @@ impl Projected {
             self.recent.push(self.rg);
         }
         let beta = self.rg / old;
+        if !self.aimed {
+            self.steps.push(alpha, beta);
+        }
         self.p.iter_mut().zip(&self.g).for_each(|(p, g)| *p = g + beta * *p);
         self.iterations += 1;
         self.finished()
@@ -357,6 +385,7 @@ impl Correct for Projected {
         self.best = f64::INFINITY;
         self.best_at = 0;
         self.recent.clear();
+        self.steps = Lanczos::default();
         self.pending = Pending::Start { r2: r2.to_vec() };
     }
 

@@ -96,6 +96,8 @@ pub struct Solver {
     pub(super) h: Arc<Operator>,
     pub(super) blocks: Vec<(Arc<Structure>, Block)>,
     pub(super) notes: Vec<String>,
+    /// How many of them were there before anything was solved.
+    known: usize,
     pub(super) dropped: Dropped,
     /// One a block, kept for other targets.
     pub(super) correctors: Vec<Option<Box<dyn Correct>>>,
@@ -156,6 +158,7 @@ impl Solver {
             h,
             correctors: (0..blocks.len()).map(|_| None).collect(),
             blocks,
+            known: notes.len(),
             notes,
             dropped,
             at: (0, 0),
@@ -220,6 +223,7 @@ impl Solver {
                 return self.advance();
             }
             self.stage = Stage::Finished;
+            self.explain("rounding keeps the shape from settling: constraints or weights differ too much in size");
             return Ok(None);
         }
         if self.blocks[b].0.rows() == 0 {
@@ -317,6 +321,14 @@ impl Solver {
             self.converged &= self.at.0 >= self.blocks.len();
             self.judge();
             self.judge_curvature();
+            self.explain("the iterations allowed did not suffice");
+        }
+    }
+
+    /// Nothing ends without convergence and without a word.
+    fn explain(&mut self, why: &str) {
+        if !self.converged && self.notes.len() <= self.known {
+            self.notes.push(why.to_owned());
         }
     }
 

@@ -11,7 +11,7 @@ pub(crate) use block::{Block, Redundant, Structure, merged, sight};
 pub(crate) use dependence::sparse_dot;
 pub use space::Space;
 
-use crate::constraint::{Constraint, ConstraintError};
+use crate::constraint::{Constraint, ConstraintError, Demand};
 use crate::energy::{Energy, EnergyError, Stiffness};
 
 /// A shape to be found: the smoothest spline that does what the constraints say.
@@ -62,6 +62,9 @@ pub enum ProblemError {
     /// Powers of spans this long or short are no numbers.
     #[error("a domain of length {0:e}: energies can be computed for lengths from 1e-25 to 1e25")]
     Domain(f64),
+    /// Heights whose squares are lost.
+    #[error("no position is above {0:e} in size: energies are squares, so scale the shape to above 1e-100")]
+    Tiny(f64),
     /// More memory than the limit.
     #[error("{what} would take {bytes} bytes, the limit is {limit}: use fewer spans or constraints")]
     Memory {
@@ -73,6 +76,9 @@ pub enum ProblemError {
         limit: u64,
     },
 }
+
+/// Positions none of which is as large as this have energies that may be no numbers.
+const SMALLEST: f64 = 1e-100;
 
 /// No problem may need more memory than this, for its coefficients or for a dense matrix of its constraints.
 pub(crate) const MEMORY: u64 = 8 << 30;
@@ -111,6 +117,16 @@ impl Problem {
         }
         for c in &constraints {
             c.check(&space, coordinates)?;
+        }
+        let sizes = constraints.iter().flat_map(|c| match &c.demand {
+            Demand::Position(values) => values.iter().flatten().map(|v| v.abs()).collect(),
+            Demand::Derivative(_, values) => values.iter().flatten().map(|v| v.abs()).collect(),
+            Demand::Image { offset, .. } => offset.iter().map(|v| v.abs()).collect::<Vec<f64>>(),
+            _ => Vec::new(),
+        });
+        let size = sizes.fold(0.0, f64::max);
+        if size > 0.0 && size < SMALLEST {
+            return Err(ProblemError::Tiny(size));
         }
         let mut names: Vec<&str> = constraints.iter().map(|c| c.id.as_str()).collect();
         names.sort_unstable();

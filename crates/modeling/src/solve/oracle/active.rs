@@ -3,7 +3,7 @@
 use super::cover::{Cover, Marks};
 use super::hierarchy::{Function, Hierarchy};
 use super::values::{ActiveGreen, Numbers, Seen};
-use crate::energy::{Hessian, Scratch};
+use crate::energy::{Hessian, Operator, Scratch};
 use crate::solve::border::Border;
 use crate::solve::bpx::dense_factor;
 use crate::solve::cholesky::{Cholesky, dot, start};
@@ -95,7 +95,7 @@ impl Active {
     /// `None` where the axes have no common pyramid; the coarsest B-splines are active.
     pub(crate) fn new(problem: &Problem, hierarchy: Hierarchy, blocks: Vec<crate::system::Block>) -> Option<Active> {
         let hierarchy = Arc::new(hierarchy);
-        let coarsest = crate::energy::Operator::new(&hierarchy.spaces[0], problem.energy(), None);
+        let coarsest = Operator::new(&hierarchy.spaces[0], problem.energy(), None);
         let coarse = Arc::new(dense_factor(&coarsest, problem.energy())?);
         let functions: Vec<Function> = hierarchy.coarsest().collect();
         let parts = blocks
@@ -362,6 +362,27 @@ impl Active {
             }
         }
         Gains { functions: gains.into_iter().collect() }
+    }
+
+    /// The energy of the coefficients as they are written, with that of soft rows, by the operator of all of them: that
+    /// of the functions may have lost it to rounding.
+    pub(crate) fn written(&self, h: &Operator, coordinates: usize) -> f64 {
+        let all = self.coefficients(coordinates);
+        let mut energy = all.iter().map(|x| h.energy(x)).sum::<f64>();
+        for part in &self.parts {
+            for side in &part.sides {
+                let x: Vec<f64> = side.coordinates.iter().flat_map(|c| all[*c].iter().copied()).collect();
+                for (r, give) in part.structure.give.iter().enumerate().filter(|g| *g.1 > 0.0) {
+                    energy += (part.structure.apply_row(r, &x) - side.targets[r]).powi(2) / give;
+                }
+            }
+        }
+        energy
+    }
+
+    /// What rounding makes of the energy of a good solution of such an energy and height.
+    pub(crate) fn rounding(&self, energy: f64, height: f64) -> f64 {
+        NOISE[0] * height * height * self.coarse_trace + NOISE[1] * energy * self.functions.len() as f64
     }
 
     /// The B-spline coefficients of the finest level, of every coordinate; the one thing of full size.

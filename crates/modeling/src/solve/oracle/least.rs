@@ -2,6 +2,7 @@
 
 use crate::solve::method::{Method, Settings};
 use crate::solve::refine::Solver;
+use crate::solve::solution::Solution;
 use crate::system::{Problem, Space};
 
 /// Sides of a cell that differ by this factor are not square any more.
@@ -15,11 +16,20 @@ pub(super) fn cells_are_square(space: &Space) -> bool {
     (1.0 / SQUARE..=SQUARE).contains(&(s.density() / t.density()))
 }
 
-/// The least energy, soft rows included, by the solver that `auto` picks, or a sparse factor where that one fails.
+/// What the shape of least energy is known by.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Least {
+    /// Energy, soft rows included.
+    pub(super) energy: f64,
+    /// The largest distance of a coefficient from the middle one of its coordinate.
+    pub(super) height: f64,
+}
+
+/// The least energy and its shape, by the solver that `auto` picks, or a sparse factor where that one fails.
 ///
 /// # Errors
 /// A sentence: they failed, or did not converge.
-pub(super) fn energy(problem: &Problem) -> Result<f64, String> {
+pub(super) fn energy(problem: &Problem) -> Result<(Least, Solution), String> {
     let solved = |method: Method| {
         let settings = Settings { method, tolerance: 1e-9, ..Settings::default() };
         Solver::new(problem.clone(), settings).and_then(Solver::run)
@@ -38,5 +48,13 @@ pub(super) fn energy(problem: &Problem) -> Result<f64, String> {
         let value: f64 = row.entries().map(|(c, i, v)| v * x[c][i]).sum();
         (value - row.target).powi(2) / row.give
     };
-    Ok(full.energy() + problem.rows().iter().filter(|r| r.give > 0.0).map(soft).sum::<f64>())
+    let height = |x: &Vec<f64>| {
+        let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+        0.5 * (high - low)
+    };
+    let least = Least {
+        energy: full.energy() + problem.rows().iter().filter(|r| r.give > 0.0).map(soft).sum::<f64>(),
+        height: x.iter().map(height).fold(0.0, f64::max),
+    };
+    Ok((least, full))
 }

@@ -27,6 +27,7 @@ use crate::energy::Operator;
 use crate::system::Problem;
 use active::{Active, Gains, Saved, Solved};
 use hierarchy::{Function, Hierarchy};
+use least::Least;
 use ondelette_wavelet::Boundary;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -83,7 +84,10 @@ pub struct Oracle {
     last: Solved,
     excess: f64,
     /// The least energy, where it must be known, and how much closer iterations must come than they need elsewhere.
-    least: Option<f64>,
+    least: Option<Least>,
+    /// Its shape, which stands in where rounding keeps the active functions from coming near it.
+    full: Option<Solution>,
+    instead: bool,
     share: f64,
     converged: bool,
 }
@@ -175,6 +179,8 @@ impl Oracle {
             last: Solved::default(),
             excess: f64::INFINITY,
             least: None,
+            full: None,
+            instead: false,
             share: 1.0,
             converged: false,
         })
@@ -244,13 +250,28 @@ impl Oracle {
 
     /// The energy that the solution may have above the least; rounding at least.
     fn allowed(&self) -> f64 {
-        (self.bound * self.last.energy).max(self.last.noise)
+        (self.bound * self.last.energy).max(self.noise())
+    }
+
+    /// What rounding makes of energies this size; what is far from the least shape is no measure of it.
+    fn noise(&self) -> f64 {
+        let most = self.least.map_or(f64::INFINITY, |l| self.active.rounding(l.energy, l.height));
+        self.last.noise.min(most)
+    }
+
+    /// The energy of what there is: where the least is known, as it will be written.
+    fn energy(&self) -> f64 {
+        if self.least.is_some() { self.written() } else { self.last.energy }
+    }
+
+    fn written(&self) -> f64 {
+        self.active.written(&self.h, self.problem.coordinates())
     }
 
     /// The energy above the least that may be promised: rounding is an excuse only for energies that are nothing else.
     fn promised(&self) -> f64 {
-        let nothing = self.least.unwrap_or(self.last.energy) <= NOTHING * self.last.noise;
-        if nothing { self.allowed() } else { self.bound * self.last.energy }
+        let energy = self.least.map_or(self.last.energy, |l| l.energy);
+        if energy <= NOTHING * self.noise() { self.allowed() } else { self.bound * energy }
     }
 
     /// True where more iterations would change next to nothing.
@@ -280,7 +301,7 @@ impl Oracle {
         if self.least.is_none() && !least::cells_are_square(self.problem.space()) {
             // Nothing to compare with: the shape meets its rows, but nobody knows how near the least it is.
             match least::energy(&self.problem) {
-                Ok(least) => self.least = Some(least),
+                Ok((least, full)) => (self.least, self.full) = (Some(least), Some(full)),
                 Err(why) => {
                     self.notes.push(why);
                     return Ok(());
@@ -298,9 +319,11 @@ impl Oracle {
         let sum = sum(&gains);
         let mut gains = gains.functions;
         gains.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        // Nothing is below zero, whatever rounding made of the least.
-        let above = |least: f64| if self.last.energy > 0.0 { self.last.energy - least } else { 0.0 };
-        self.excess = self.least.map_or(REACH * sum + self.last.left, above);
+        let energy = self.energy();
+        self.excess = self.least.map_or(REACH * sum + self.last.left, |least| energy - least.energy);
+        if self.excess.is_nan() {
+            self.excess = f64::INFINITY;
+        }
         if self.least.is_some() && self.excess > (GROWTH * allowed).max(REACH * sum) && self.share > CLOSEST {
             // Nobody would gain what is left: it is the iteration's.
             self.share *= 0.01;
@@ -327,12 +350,26 @@ impl Oracle {
             self.phase = Phase::Grow;
             return Ok(());
         }
-        let below = (BELOW * allowed).max(self.last.noise);
+        let below = (BELOW * allowed).max(self.noise());
         let promised = self.promised();
-        self.converged = (-below..=promised).contains(&self.excess);
+        let is_real = energy >= -below && self.last.energy >= -below && self.written() <= energy + promised + below;
+        // Less than the least is rounding's, of the one or the other.
+        self.converged = is_real && self.excess <= promised;
         self.excess = self.excess.max(0.0);
+        if !self.converged
+            && let Some(least) = self.least
+        {
+            self.notes.push("rounding keeps wavelets of such long cells apart: this is the full solution".to_owned());
+            (self.instead, self.converged, self.excess, self.last.energy) = (true, true, 0.0, least.energy);
+            return Ok(());
+        }
         if !self.converged {
-            self.notes.push("the active functions do not come as near to the least energy as was asked".to_owned());
+            let why = if is_real {
+                "the active functions do not come as near to the least energy as was asked"
+            } else {
+                "rounding has taken the energy of the active functions: ask for a full solution"
+            };
+            self.notes.push(why.to_owned());
             return Ok(());
         }
         let corner = self.active.corner();
@@ -358,8 +395,8 @@ impl Oracle {
             bad,
             next: next.max(1),
             trials: 0,
-            grown: (self.last.energy, self.excess),
-            most: self.last.energy + budget,
+            grown: (energy, self.excess),
+            most: energy + budget,
         }));
         Ok(())
     }
@@ -373,7 +410,7 @@ impl Oracle {
             self.active.replace(rest);
             self.solve(1e-3)?;
             d.trials += 1;
-            if self.last.unmet == 0 && self.last.energy <= d.most {
+            if self.last.unmet == 0 && self.energy() <= d.most {
                 d.good = d.next;
                 (d.kept, d.solved) = (self.active.save(), self.last);
             } else {
@@ -383,7 +420,7 @@ impl Oracle {
             }
             d.next = usize::midpoint(d.good, d.bad);
         }
-        self.excess = (d.grown.1 + self.last.energy - d.grown.0).max(0.0);
+        self.excess = (d.grown.1 + self.energy() - d.grown.0).max(0.0);
         let close = d.bad - d.good <= 1 + d.order.len() / 100;
         if !over && d.trials < TRIALS && !close {
             self.phase = Phase::Drop(d);
@@ -431,6 +468,19 @@ impl Oracle {
     pub fn solution(&self) -> Solution {
         let problem = &self.problem;
         let mut coefficients = self.active.coefficients(problem.coordinates());
+        if let Some(full) = self.full.as_ref().filter(|_| self.instead) {
+            return Solution::new(
+                problem.space().clone(),
+                full.coefficients().to_vec(),
+                self.h.clone(),
+                full.residuals().to_vec(),
+                full.method(),
+                self.active.iterations + full.iterations(),
+                self.converged,
+                self.notes.clone(),
+            )
+            .adapted(problem.space().len(), self.excess);
+        }
         for (x, mean) in coefficients.iter_mut().zip(&self.means).filter(|e| *e.1 != 0.0) {
             x.iter_mut().for_each(|x| *x += mean);
         }
