@@ -8,6 +8,8 @@ use super::{LEAST_LAMP_RAYS, SMALL_SHARE, Sampled, TINY_SHARE};
 use crate::rgb::Rgb;
 use ondelette_compress::{NodeId, transport};
 
+/// Under a cap on memory a misfit below this share of what is allowed is not worth the samples of a split.
+const WORTHY: f64 = 1.0 / 400.0;
 /// An element that sends on this many times the share of the light that its grain is meant for is not one of very many.
 const BRIGHT: f64 = 4.0;
 
@@ -71,9 +73,10 @@ impl Sampled {
             }
         }
         worst.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let least = if self.cap.is_some() { WORTHY * target } else { 0.0 };
         let mut rest = 1.3 * (total - target);
         let enough = worst.iter().take_while(|(missed, _)| {
-            let more = rest > 0.0;
+            let more = rest > 0.0 && *missed >= least;
             rest -= missed;
             more
         });
