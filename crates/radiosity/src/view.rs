@@ -13,6 +13,10 @@ use ondelette_numerics::par;
 
 /// Samples of a pixel an axis.
 const SAMPLES: usize = 3;
+/// Samples on the diagonal of a pixel: where direct light is gathered and these differ by no more than this share, on one
+/// surface, they speak for the others.
+const DIAGONAL: [usize; 3] = [0, 4, 8];
+const EVEN: f64 = 0.02;
 /// Rows of a step.
 const ROWS: usize = 8;
 
@@ -83,34 +87,44 @@ impl<'a> Renderer<'a> {
     }
 
     fn pixel(&self, column: usize, row: usize) -> [f32; 3] {
-        let mut sum = Rgb::BLACK;
         let [width, height] = self.size.map(|n| n as f64);
-        for k in 0..SAMPLES * SAMPLES {
+        let seen: [Option<(usize, [f64; 2])>; SAMPLES * SAMPLES] = std::array::from_fn(|k| {
             let offset = |k: usize| (k as f64 + 0.5) / SAMPLES as f64;
             let x = 2.0 * (column as f64 + offset(k % SAMPLES)) / width - 1.0;
             let y = 1.0 - 2.0 * (row as f64 + offset(k / SAMPLES)) / height;
-            sum += self.radiance(self.lens.direction(x, y));
-        }
-        (sum * (1.0 / (SAMPLES * SAMPLES) as f64)).0.map(|c| c as f32)
-    }
-
-    fn radiance(&self, direction: DVec3) -> Rgb {
-        let kernel = &self.kernel;
-        let seen = kernel
-            .occluders()
-            .first_hit(self.lens.eye, direction, |patch, front| kernel.side_of(patch, !front).is_none());
-        let Some(hit) = seen else { return Rgb::BLACK };
-        match kernel.side_of(hit.patch, !hit.front) {
-            None => Rgb::BLACK,
-            Some(side) => {
-                let at = if hit.front { hit.at } else { [hit.at[1], hit.at[0]] };
-                let radiosity = match &self.prober {
-                    Some(prober) => prober.radiosity(side, at),
-                    None => self.solution.radiosity(side, at),
-                };
-                radiosity.map(|b| (b / std::f64::consts::PI).max(0.0))
+            self.surface(self.lens.direction(x, y))
+        });
+        let mean = |radiances: &[Rgb]| {
+            let sum = radiances.iter().fold(Rgb::BLACK, |sum, r| sum + *r);
+            (sum * (1.0 / radiances.len() as f64)).0.map(|c| c as f32)
+        };
+        let is_one_surface = seen.iter().all(|s| s.map(|s| s.0) == seen[0].map(|s| s.0));
+        if self.prober.is_some() && is_one_surface {
+            let some = DIAGONAL.map(|k| self.radiance(seen[k]));
+            let [low, high] = [f64::min, f64::max].map(|f| some.map(|r| r.sum()).into_iter().reduce(f).unwrap_or(0.0));
+            if high - low <= EVEN * high {
+                return mean(&some);
             }
         }
+        mean(&seen.map(|at| self.radiance(at)))
+    }
+
+    /// The side that is seen in a direction, and where.
+    fn surface(&self, direction: DVec3) -> Option<(usize, [f64; 2])> {
+        let kernel = &self.kernel;
+        let through = |patch, front: bool| kernel.side_of(patch, !front).is_none();
+        let hit = kernel.occluders().first_hit(self.lens.eye, direction, through)?;
+        let side = kernel.side_of(hit.patch, !hit.front)?;
+        Some((side, if hit.front { hit.at } else { [hit.at[1], hit.at[0]] }))
+    }
+
+    fn radiance(&self, seen: Option<(usize, [f64; 2])>) -> Rgb {
+        let Some((side, at)) = seen else { return Rgb::BLACK };
+        let radiosity = match &self.prober {
+            Some(prober) => prober.radiosity(side, at),
+            None => self.solution.radiosity(side, at),
+        };
+        radiosity.map(|b| (b / std::f64::consts::PI).max(0.0))
     }
 }
 
