@@ -50,9 +50,7 @@ pub(crate) fn light(root: &Path, extent: Extent) -> Result<(), String> {
     fs::create_dir_all(&bench.folder).map_err(|e| format!("{}: {e}", bench.folder.display()))?;
     println!("CPU and wall seconds: `light`, median of {RUNS} runs, offices of one; memory: peak of the process.");
     println!("error: of cell means, against bench/scenes; verify: point by point, by `ondelette verify`, at most.");
-    println!(
-        "direct: `--direct gather` leaves the edges of shadows to what reads the solution, some 5 CPU microseconds a point."
-    );
+    println!("direct: `gather` leaves the edges of shadows to what reads the solution, some 8 microseconds a point.");
     println!("scene        quads   asked  direct     CPU s    wall s   memory    error   verify (95 %)");
     for scene in SCENES {
         let file = root.join(format!("bench/scenes/{scene}.obj"));

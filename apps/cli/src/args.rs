@@ -143,10 +143,10 @@ pub(crate) struct LightArgs {
     #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     pub(crate) max_time: Option<String>,
 
-    /// How direct light is read from the solution: fitted (elements are as small as shadows need), or gathered from the
-    /// lamps, with exact visibility, at every pixel, vertex and point in a penumbra. The promise is for what is read so:
-    /// gathered, far fewer elements do, and what reads the solution takes longer; models get as many vertices as the
-    /// shadows need
+    /// How direct light is read from the solution: fitted (elements are as small as shadows need), or gathered from
+    /// the lamps, with exact visibility, at every pixel, vertex and point in a penumbra. The promise is for what is
+    /// read so: gathered, far fewer elements do, and what reads the solution takes longer; models get as many vertices
+    /// as the shadows need
     #[arg(long, value_name = "HOW", default_value = "fitted")]
     pub(crate) direct: DirectLight,
 

@@ -1,7 +1,7 @@
 //! Reading a solution at points: on its surfaces, or gathered at free points.
 //!
-//! Where the settings say [`DirectLight::Gathered`], direct light at a point in a penumbra is that of the lamps with exact
-//! visibility, and shadows are crisp at any density of points.
+//! Where the settings say [`DirectLight::Gathered`], direct light at a point in a penumbra is that of the lamps with
+//! exact visibility, and shadows are crisp at any density of points.
 
 use crate::kernel::LightKernel;
 use crate::rgb::Rgb;

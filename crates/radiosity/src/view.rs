@@ -13,8 +13,8 @@ use ondelette_numerics::par;
 
 /// Samples of a pixel an axis.
 const SAMPLES: usize = 3;
-/// Samples on the diagonal of a pixel: where direct light is gathered and these differ by no more than this share, on one
-/// surface, they speak for the others.
+/// Samples on the diagonal of a pixel: where direct light is gathered and these differ by no more than this share, on
+/// one surface, they speak for the others.
 const DIAGONAL: [usize; 3] = [0, 4, 8];
 const EVEN: f64 = 0.02;
 /// Rows of a step.

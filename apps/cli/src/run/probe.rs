@@ -7,8 +7,8 @@ use glam::DVec3;
 use ondelette_io::onl::read_solution;
 use ondelette_io::write::{AtomicFile, check_writable, push_row};
 use ondelette_numerics::par;
-use ondelette_radiosity::Solution;
 use ondelette_radiosity::probe::{Prober, REACH};
+use ondelette_radiosity::{DirectLight, Solution};
 use std::io::Write;
 use std::path::Path;
 
@@ -80,10 +80,12 @@ fn answer(solution: &Solution, points: &[Point], args: &ProbeArgs) -> Result<Vec
     let prober = match args.direct {
         None => Prober::new(solution),
         Some(direct) => Prober::reading(solution, direct.into()).ok_or_else(|| {
-            Refusal::new(format!(
-                "{}: it did not keep what --direct gather needs: solve it again with --direct gather",
-                args.solution.display()
-            ))
+            let why = if solution.settings().direct == DirectLight::Gathered {
+                "it was stopped before all of its direct light was known: solve it for longer"
+            } else {
+                "it did not keep what --direct gather needs: solve it again with --direct gather"
+            };
+            Refusal::new(format!("{}: {why}", args.solution.display()))
         })?,
     };
     let chunks = par::map(points.len().div_ceil(CHUNK), |chunk| {

@@ -10,7 +10,8 @@
 //! ```
 //!
 //! Rows of light weights, whose 1 / w is all that is to be seen in S, would hide the others: they are scaled by a
-//! power of two, which costs no digits. S is factored with `tau Y Y^T` added, which changes no solution and makes it positive definite.
+//! power of two, which costs no digits. S is factored with `tau Y Y^T` added, which changes no solution and makes it
+//! positive definite.
 
 use super::cholesky::{Cholesky, dot, start};
 

@@ -55,7 +55,12 @@ impl ExactDirect {
 
     /// Whether direct light is read exactly on a leaf.
     pub(crate) fn is_marked(&self, leaf: NodeId) -> bool {
-        self.missed[leaf.index()].is_marked(self.allowed)
+        self.missed[leaf.index()].is_marked(self.allowed, self.lamp_rays(leaf))
+    }
+
+    /// Rays of a point that the leaf was fitted with.
+    fn lamp_rays(&self, leaf: NodeId) -> f64 {
+        f64::from(self.kept.lamp_rays[leaf.index()])
     }
 
     /// Irradiance at a local point of a leaf: the direct light there, and what the leaf's function says of reflected
@@ -96,7 +101,7 @@ impl ExactDirect {
         if kernel.is_covered(side, point) {
             return exact;
         }
-        let (missed, lamp_rays) = (self.missed[leaf.index()], f64::from(self.kept.lamp_rays[leaf.index()]));
+        let (missed, lamp_rays) = (self.missed[leaf.index()], self.lamp_rays(leaf));
         let rays = |may_bring: f64| missed.rays(may_bring, self.allowed, lamp_rays);
         let sight = self.sights.about((&self.lamps, kernel), (leaf.index(), cell), x, rays);
         let mut view = View::new(kernel.occluders().tolerance());

@@ -2,7 +2,6 @@
 //! error counts there: leaves whose functions miss too much of it are in a penumbra. Who plans elements and who reads
 //! them both ask here.
 
-use super::plan::MOST_LAMP_RAYS;
 use crate::rgb::Rgb;
 
 /// A leaf is in a penumbra when its direct light misses this share of the promised error times the mean irradiance.
@@ -16,8 +15,9 @@ const READ: f64 = 0.6;
 const POINT_TO_LEAF: f64 = 2.0;
 /// Scatter of whether a lamp is seen, at most.
 const SEEN_OR_NOT: f64 = 0.5;
-/// Fewest rays to the lamps for a point that is read.
+/// Fewest and most rays to the lamps for a point that is read.
 const LEAST_RAYS: f64 = 16.0;
+const MOST_RAYS: f64 = 4096.0;
 
 /// What the direct light of a leaf misses, channels summed.
 #[derive(Clone, Copy, Debug)]
@@ -39,20 +39,28 @@ impl Missed {
         Missed { misfit: sum, scatter: square.sqrt() }
     }
 
-    /// Whether the leaf is in a penumbra.
-    pub(super) fn is_marked(self, allowed: f64) -> bool {
-        self.misfit + self.scatter > allowed
+    /// Whether the leaf is in a penumbra, and better read from the lamps, with the rays that there are for that, than
+    /// from what was fitted with `lamp_rays` a point.
+    pub(super) fn is_marked(self, allowed: f64, lamp_rays: f64) -> bool {
+        let fitted = self.misfit + self.scatter;
+        fitted > allowed && self.read(lamp_rays) < fitted
     }
 
-    /// What counts of it where direct light is gathered: of a marked leaf, what reflected light brings back. Beside it
-    /// the scatter of what is read, which nothing that is done to the leaf brings down.
+    /// What counts of it where direct light is gathered: of a marked leaf, what reflected light brings back, and the
+    /// scatter of what is read, as far as it is too much. Beside it the scatter that it always has.
     pub(super) fn gathered(self, allowed: f64, lamp_rays: f64) -> (Self, f64) {
-        if !self.is_marked(allowed) {
+        if !self.is_marked(allowed, lamp_rays) {
             return (self, 0.0);
         }
-        let at_least = self.of_one_ray(lamp_rays) / MOST_LAMP_RAYS.sqrt();
-        let read = if self.scatter > 0.0 { at_least.max(READ * allowed) } else { 0.0 };
-        (Missed { misfit: PASSED_ON * self.misfit, scatter: PASSED_ON * self.scatter }, read)
+        let (read, usual) = (self.read(lamp_rays), READ * allowed);
+        let too_much = if read > usual { read } else { 0.0 };
+        let usual = if self.scatter > 0.0 { usual } else { 0.0 };
+        (Missed { misfit: PASSED_ON * self.misfit, scatter: (PASSED_ON * self.scatter).hypot(too_much) }, usual)
+    }
+
+    /// Least scatter of a point that is read.
+    fn read(self, lamp_rays: f64) -> f64 {
+        self.of_one_ray(lamp_rays) / MOST_RAYS.sqrt()
     }
 
     /// Rays of a point that is read to all lamps which it may see past many things, and which may bring so much: from
@@ -61,7 +69,7 @@ impl Missed {
         let one = self.of_one_ray(lamp_rays).min(SEEN_OR_NOT * may_bring);
         let rays = (one / (READ * allowed)).powi(2);
         // in the dark nothing is allowed and nothing comes: 0 / 0
-        if rays > LEAST_RAYS { rays.min(MOST_LAMP_RAYS) } else { LEAST_RAYS }
+        if rays > LEAST_RAYS { rays.min(MOST_RAYS) } else { LEAST_RAYS }
     }
 
     /// Scatter that one ray of a point would have.

@@ -38,8 +38,8 @@ pub(super) const MOST_DIRECTIONS: f64 = 65_536.0;
 const GROWTH: f64 = 32.0;
 /// Mean absolute value of a misfit over its root mean square.
 pub(super) const MEAN_OF_MISFIT: f64 = 0.8;
-/// What gathering elements cannot say is more than their points see: legs and feet pass between them. Where direct light
-/// is gathered, nothing else is overrated to make up for it.
+/// What gathering elements cannot say is more than their points see: legs and feet pass between them. Where direct
+/// light is gathered, nothing else is overrated to make up for it.
 const UNSEEN: f64 = 1.4;
 /// Mean root of the positive part of a scattered number of mean 0, over the root of its standard deviation.
 pub(super) const FLOOR: f64 = 0.4;

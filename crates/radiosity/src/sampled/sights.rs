@@ -13,7 +13,7 @@ const REMEMBERED: usize = 128 << 20;
 /// With more rays than these, a part of the leaf is looked from instead: less stands before the lamps that it sees.
 const MANY_RAYS: f64 = 200.0;
 /// Splits of a leaf that may be tried for it.
-const DEEPER: u32 = 2;
+const DEEPER: u32 = 4;
 
 /// What is seen from a cell, and with how many rays to the lamps that are left to rays.
 #[derive(Clone, Debug)]

@@ -100,8 +100,8 @@ pub enum SolveError {
     Paint(#[from] crate::scene::PaintError),
     /// A solution without samples or links to go on from.
     #[error(
-        "the solution of '{0}' kept neither samples nor links, so there is nothing to go on from: \
-         solve it again with --keep-links; methods with links keep them unless --memory has no room for all"
+        "the solution of '{0}' kept no samples or links to go on from: solve it again with --keep-links; methods with \
+         links keep them unless --memory has no room for all"
     )]
     NothingKept(String),
 }
@@ -141,7 +141,8 @@ impl Solver {
     /// ```
     /// use ondelette_radiosity::{Method, Settings, Solver, scene::samples};
     /// let links = ondelette_radiosity::LinkSettings { subdivision: Some(3), ..Default::default() };
-    /// let settings = Settings { method: Method::Classical, basis: "haar".parse().unwrap(), links, error: 0.1, ..Settings::default() };
+    /// let (method, basis, error) = (Method::Classical, "haar".parse().unwrap(), 0.1);
+    /// let settings = Settings { method, basis, links, error, ..Settings::default() };
     /// let scene = || samples::facing_squares(1.0);
     /// let light = |cap| {
     ///     let mut solver = Solver::within(scene(), settings, cap)?;
